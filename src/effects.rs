@@ -1,0 +1,222 @@
+//! Which effects a scene asks for: the one place that looks at a scene and decides.
+//!
+//! An effect that nothing asks for is not in the kernel: its module is not imported, its members
+//! are dropped from the shared structs, its branches and bindings are gone. The kernel's sources
+//! (`shaders/`) name effects in `@if(...)`; [`Effects::flags`] says which are on.
+
+use crate::placement::{Placement, Side};
+use crate::scene::{MaterialKind, Scene};
+use crate::settings::{GeometryChoice, Integrator, Settings};
+
+/// Spheres up to which they are baked into the kernel as constants: measured, see
+/// `benches/RESULTS.md`.
+pub const BAKED_LIMIT: usize = 24;
+
+/// One effect and what asked for it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Effect {
+    /// Its name: in the scene file, in the kernel, and in every output.
+    pub name: &'static str,
+    /// What it adds, in a few words.
+    pub what: &'static str,
+    /// The first objects or options that asked for it; empty if nothing did.
+    pub reasons: Vec<String>,
+}
+
+impl Effect {
+    /// Whether the effect is in the kernel.
+    #[must_use]
+    pub fn used(&self) -> bool {
+        !self.reasons.is_empty()
+    }
+}
+
+/// All effects that the program has, used or not, in the order of the data flow.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Effects {
+    table: Vec<Effect>,
+}
+
+/// Reasons listed for one effect; the rest is counted.
+const REASONS: usize = 3;
+
+impl Effects {
+    /// Derives the effects of `scene` as `placement` and `settings` have it.
+    #[must_use]
+    pub fn derive(scene: &Scene, placement: &Placement, settings: &Settings) -> Self {
+        let surfaces = |wanted: &dyn Fn(&crate::scene::Material) -> bool| {
+            reasons(scene.spheres.iter().enumerate().filter_map(|(i, sphere)| {
+                let material = &scene.materials[sphere.material];
+                wanted(material).then(|| format!("sphere {} ({})", i + 1, material.name))
+            }))
+        };
+        let kind = |wanted: &dyn Fn(&MaterialKind) -> bool| surfaces(&|m| wanted(&m.kind));
+        let placed = |wanted: &dyn Fn(&crate::placement::PlacedSphere) -> Option<&'static str>| {
+            reasons(placement.spheres.iter().filter_map(|sphere| {
+                let material = &scene.materials[sphere.material];
+                wanted(sphere)
+                    .map(|why| format!("sphere {} ({}): {why}", sphere.source + 1, material.name))
+            }))
+        };
+        let when = |condition: bool, reason: String| if condition { vec![reason] } else { vec![] };
+
+        let count = scene.spheres.len();
+        let baked = match settings.geometry {
+            GeometryChoice::Auto => count <= BAKED_LIMIT,
+            GeometryChoice::Baked => true,
+            GeometryChoice::List => false,
+        };
+        let form = |chosen: &str| match settings.geometry {
+            GeometryChoice::Auto => format!("{count} spheres; baked up to {BAKED_LIMIT}"),
+            _ => format!("--geometry {chosen}"),
+        };
+        let lecture = matches!(settings.integrator, Integrator::Lecture { .. });
+        let table = vec![
+            Effect {
+                name: "baked",
+                what: "spheres as constants in the kernel",
+                reasons: when(baked, form("baked")),
+            },
+            Effect {
+                name: "list",
+                what: "a loop over spheres in a storage buffer",
+                reasons: when(!baked, form("list")),
+            },
+            Effect {
+                name: "pole",
+                what: "frames at the poles of spheres much larger than what is near them",
+                reasons: placed(&|s| s.pole.map(|_| "much larger than what is near it")),
+            },
+            Effect {
+                name: "interior",
+                what: "paths inside spheres",
+                reasons: placed(&|s| match s.side {
+                    Side::Outside => None,
+                    Side::Inside => Some("the camera is inside"),
+                    Side::Either => Some("has two sides"),
+                }),
+            },
+            Effect {
+                name: "lens",
+                what: "a thin lens",
+                reasons: when(
+                    scene.camera.aperture_radius > 0.0,
+                    format!("camera: aperture_radius = {}", scene.camera.aperture_radius),
+                ),
+            },
+            Effect {
+                name: "diffuse",
+                what: "Lambert's law",
+                reasons: kind(&|k| matches!(k, MaterialKind::Diffuse { .. })),
+            },
+            Effect {
+                name: "mirror",
+                what: "perfect mirrors",
+                reasons: kind(&|k| matches!(k, MaterialKind::Mirror { .. })),
+            },
+            Effect {
+                name: "dielectric",
+                what: "smooth glass: Fresnel reflection and refraction",
+                reasons: kind(&|k| matches!(k, MaterialKind::Dielectric { .. })),
+            },
+            Effect {
+                name: "reflective",
+                what: "the lecture's lobe around the ideal reflection",
+                reasons: kind(&|k| matches!(k, MaterialKind::Reflective { .. })),
+            },
+            Effect {
+                name: "emission",
+                what: "surfaces that emit",
+                reasons: surfaces(&|m| m.emission.max_element() > 0.0),
+            },
+            Effect {
+                name: "environment",
+                what: "constant light from everywhere",
+                reasons: match scene.environment {
+                    Some(e) if e.max_element() > 0.0 => {
+                        vec![format!("environment: radiance = [{}, {}, {}]", e.x, e.y, e.z)]
+                    }
+                    _ => vec![],
+                },
+            },
+            Effect {
+                name: "lecture",
+                what: "uniform hemisphere, constant probability of termination",
+                reasons: when(lecture, "--integrator lecture".into()),
+            },
+            Effect {
+                name: "bsdf",
+                what: "BSDF sampling",
+                reasons: when(!lecture, "integrator bsdf".into()),
+            },
+            Effect {
+                name: "roulette",
+                what: "Russian roulette on the throughput",
+                reasons: when(settings.roulette && !lecture, "integrator bsdf".into()),
+            },
+        ];
+        Self { table }
+    }
+
+    /// Exactly the effects of `names`, for tests of the linker.
+    ///
+    /// # Panics
+    /// If a name is not an effect's.
+    #[must_use]
+    pub fn of(scene: &Scene, placement: &Placement, settings: &Settings, names: &[&str]) -> Self {
+        let mut effects = Self::derive(scene, placement, settings);
+        for name in names {
+            assert!(effects.table.iter().any(|e| e.name == *name), "no effect {name}");
+        }
+        for effect in &mut effects.table {
+            effect.reasons.clear();
+            if names.contains(&effect.name) {
+                effect.reasons.push("asked for".into());
+            }
+        }
+        effects
+    }
+
+    /// All effects, used or not.
+    #[must_use]
+    pub fn table(&self) -> &[Effect] {
+        &self.table
+    }
+
+    /// The names of the effects in use.
+    pub fn names(&self) -> impl Iterator<Item = &'static str> {
+        self.table.iter().filter(|e| e.used()).map(|e| e.name)
+    }
+
+    /// Whether the effect `name` is in use.
+    ///
+    /// # Panics
+    /// If there is no effect of that name: a misspelt name must not read as "not used".
+    #[must_use]
+    pub fn has(&self, name: &str) -> bool {
+        let effect = self.table.iter().find(|e| e.name == name);
+        effect.unwrap_or_else(|| panic!("no effect is called {name}")).used()
+    }
+
+    /// Name and state of every flag that the kernel's sources may ask for.
+    pub fn flags(&self) -> impl Iterator<Item = (&'static str, bool)> {
+        self.table.iter().map(|e| (e.name, e.used()))
+    }
+
+    /// The form of the geometry: `baked` or `list`.
+    #[must_use]
+    pub fn geometry(&self) -> &'static str {
+        if self.has("baked") { "baked" } else { "list" }
+    }
+}
+
+/// The first few of `all`, and how many more there are.
+fn reasons(all: impl Iterator<Item = String>) -> Vec<String> {
+    let mut all: Vec<String> = all.collect();
+    if all.len() > REASONS {
+        let more = all.len() - REASONS;
+        all.truncate(REASONS);
+        all.push(format!("and {more} more"));
+    }
+    all
+}

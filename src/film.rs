@@ -1,0 +1,190 @@
+//! The film: f64 sums over all samples so far, and their variance from blocks of samples.
+
+use std::ops::Range;
+
+use crate::settings::Rect;
+
+/// Samples a block: f32 sums run over one block, and the error estimate comes from the spread of
+/// the blocks. The kernel's `BLOCK`.
+pub const BLOCK: u64 = 4;
+
+/// The largest window: what a renderer sums up by itself before the film gets it.
+pub const WINDOW: u64 = 256;
+
+/// The end of the window that starts at `start`, in a range that ends at `end`. Boundaries are at
+/// fixed sample indices (16, 64, 256 and then every 256), so that no timing changes any sum.
+#[must_use]
+pub fn window_end(start: u64, end: u64) -> u64 {
+    let boundary = [16, 64].into_iter().find(|b| start < *b);
+    let boundary = boundary.unwrap_or((start / WINDOW + 1) * WINDOW);
+    // A window's samples share the high word of the sample index.
+    boundary.min(end)
+}
+
+/// One pixel's share of a window.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PixelSums {
+    /// Sum of the radiance of all samples, W/(sr m²) per channel.
+    pub sum: [f64; 3],
+    /// Sum of the squared deviations of the full blocks' sums from their mean.
+    pub m2: [f64; 3],
+}
+
+/// What a renderer returns: sums over a range of samples for every pixel of a rectangle.
+#[derive(Clone, Debug)]
+pub struct Window {
+    /// The pixels, by rows.
+    pub rect: Rect,
+    /// The samples.
+    pub samples: Range<u64>,
+    /// One entry a pixel, rows from the top.
+    pub pixels: Vec<PixelSums>,
+    /// What else happened.
+    pub tally: Tally,
+}
+
+impl Window {
+    /// The number of blocks that lie in the window as a whole.
+    #[must_use]
+    pub fn full_blocks(&self) -> u64 {
+        full_blocks(&self.samples)
+    }
+}
+
+fn full_blocks(samples: &Range<u64>) -> u64 {
+    (samples.end / BLOCK).saturating_sub(samples.start.div_ceil(BLOCK))
+}
+
+/// Counts over any set of samples.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Tally {
+    /// Rays traced.
+    pub rays: u64,
+    /// Paths that the bounce limit cut while they still carried light.
+    pub cut_paths: u64,
+    /// The throughput of these, averaged over the channels, summed.
+    pub cut_throughput: f64,
+    /// Samples that were no finite number; they are in no sum.
+    pub non_finite: u64,
+    /// The first of these.
+    pub first_non_finite: Option<NonFinite>,
+}
+
+impl Tally {
+    /// Adds the counts of further samples.
+    pub fn add(&mut self, other: &Self) {
+        self.rays += other.rays;
+        self.cut_paths += other.cut_paths;
+        self.cut_throughput += other.cut_throughput;
+        self.non_finite += other.non_finite;
+        self.first_non_finite = self.first_non_finite.or(other.first_non_finite);
+    }
+}
+
+/// Where a sample was no finite number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct NonFinite {
+    /// The pixel, in the whole image.
+    pub pixel: [u32; 2],
+    /// The sample index.
+    pub sample: u64,
+    /// The bounce after which it was seen.
+    pub bounce: u32,
+}
+
+/// Sums over all samples so far.
+#[derive(Clone, Debug)]
+pub struct Film {
+    rect: Rect,
+    samples: u64,
+    blocks: u64,
+    sum: Vec<[f64; 3]>,
+    m2: Vec<[f64; 3]>,
+    tally: Tally,
+}
+
+impl Film {
+    /// An empty film for the pixels of `rect`.
+    #[must_use]
+    pub fn new(rect: Rect) -> Self {
+        let pixels = rect.pixels();
+        Self {
+            rect,
+            samples: 0,
+            blocks: 0,
+            sum: vec![[0.0; 3]; pixels],
+            m2: vec![[0.0; 3]; pixels],
+            tally: Tally::default(),
+        }
+    }
+
+    /// Folds a window in.
+    ///
+    /// # Panics
+    /// If the window is not of the film's pixels.
+    pub fn add(&mut self, window: &Window) {
+        assert_eq!(window.rect, self.rect, "a window of other pixels");
+        let added = (window.samples.end - window.samples.start) as f64;
+        let blocks = window.full_blocks();
+        // Chan, Golub and LeVeque 1979: M2 = M2a + M2b + (mean_b - mean_a)^2 na nb/(na + nb), here
+        // of block sums, whose mean is BLOCK times the pixel's mean.
+        let (na, nb) = (self.blocks as f64, blocks as f64);
+        let weight = if na + nb > 0.0 { na * nb / (na + nb) } else { 0.0 };
+        let scale_a = if self.samples > 0 { BLOCK as f64 / self.samples as f64 } else { 0.0 };
+        let scale_b = BLOCK as f64 / added;
+        for ((sum, m2), pixel) in self.sum.iter_mut().zip(&mut self.m2).zip(&window.pixels) {
+            for c in 0..3 {
+                let delta = pixel.sum[c] * scale_b - sum[c] * scale_a;
+                m2[c] += pixel.m2[c] + delta * delta * weight;
+                sum[c] += pixel.sum[c];
+            }
+        }
+        self.samples += window.samples.end - window.samples.start;
+        self.blocks += blocks;
+        self.tally.add(&window.tally);
+    }
+
+    /// The film's pixels.
+    #[must_use]
+    pub fn rect(&self) -> Rect {
+        self.rect
+    }
+
+    /// Samples a pixel so far.
+    #[must_use]
+    pub fn samples(&self) -> u64 {
+        self.samples
+    }
+
+    /// Counts over all samples so far.
+    #[must_use]
+    pub fn tally(&self) -> &Tally {
+        &self.tally
+    }
+
+    /// The mean radiance of pixel `i`, W/(sr m²) per channel; zero without samples.
+    #[must_use]
+    pub fn mean(&self, i: usize) -> [f64; 3] {
+        let n = self.samples.max(1) as f64;
+        self.sum[i].map(|s| s / n)
+    }
+
+    /// The estimated variance of [`mean`](Self::mean), from the spread of the blocks; `None` below
+    /// 16 blocks, where it would be a guess.
+    #[must_use]
+    pub fn variance_of_mean(&self, i: usize) -> Option<[f64; 3]> {
+        if self.blocks < 16 {
+            return None;
+        }
+        // Variance of a block's sum = BLOCK times that of a sample.
+        let blocks = self.blocks as f64;
+        let scale = 1.0 / ((blocks - 1.0) * BLOCK as f64 * self.samples as f64);
+        Some(self.m2[i].map(|m2| m2 * scale))
+    }
+
+    /// The means as linear f32, rows from the top.
+    #[must_use]
+    pub fn pixels(&self) -> Vec<[f32; 3]> {
+        (0..self.sum.len()).map(|i| self.mean(i).map(|x| x as f32)).collect()
+    }
+}

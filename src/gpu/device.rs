@@ -1,0 +1,221 @@
+//! Adapters and devices: finding, choosing, opening, and noticing when one fails.
+
+use std::sync::{Arc, Mutex};
+
+use crate::error::{Error, Result};
+
+/// What can be said about an adapter before it is opened.
+#[derive(Clone, Debug)]
+pub struct AdapterSummary {
+    /// Position in the list of adapters, as `--device` takes it.
+    pub index: usize,
+    /// The adapter's name.
+    pub name: String,
+    /// Graphics interface: `vulkan`, `metal`, `dx12` or `gl`.
+    pub backend: String,
+    /// Driver name and version.
+    pub driver: String,
+    /// Discrete, integrated, virtual or software.
+    pub kind: &'static str,
+    /// Its limits.
+    pub limits: wgpu::Limits,
+    /// Why it cannot run the kernel, if it cannot.
+    pub unusable: Option<String>,
+}
+
+/// An open device.
+#[derive(Debug)]
+pub struct Gpu {
+    /// The device.
+    pub device: wgpu::Device,
+    /// Its queue.
+    pub queue: wgpu::Queue,
+    /// The limits it was opened with: the adapter's own.
+    pub limits: wgpu::Limits,
+    /// What it is.
+    pub summary: AdapterSummary,
+    faults: Arc<Mutex<Vec<String>>>,
+}
+
+/// How to choose among adapters.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum DeviceChoice {
+    /// The fastest kind of device.
+    #[default]
+    Best,
+    /// By position in the list of `gpu-trace devices`.
+    Index(usize),
+    /// By part of the name, in any case.
+    Name(String),
+}
+
+impl std::str::FromStr for DeviceChoice {
+    type Err = std::convert::Infallible;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        Ok(text.parse().map_or_else(|_| Self::Name(text.to_owned()), Self::Index))
+    }
+}
+
+fn instance() -> wgpu::Instance {
+    // The environment's WGPU_BACKEND is honoured; no display is needed.
+    let descriptor = wgpu::InstanceDescriptor::new_without_display_handle_from_env();
+    wgpu::Instance::new(descriptor)
+}
+
+fn adapters() -> Vec<(wgpu::Adapter, AdapterSummary)> {
+    let all = pollster::block_on(instance().enumerate_adapters(wgpu::Backends::all()));
+    all.into_iter()
+        .enumerate()
+        .map(|(index, adapter)| {
+            let summary = summarize(index, &adapter);
+            (adapter, summary)
+        })
+        .collect()
+}
+
+fn summarize(index: usize, adapter: &wgpu::Adapter) -> AdapterSummary {
+    let info = adapter.get_info();
+    let limits = adapter.limits();
+    let driver = match (info.driver.is_empty(), info.driver_info.is_empty()) {
+        (false, false) => format!("{} {}", info.driver, info.driver_info),
+        (false, true) => info.driver.clone(),
+        _ => info.driver_info.clone(),
+    };
+    AdapterSummary {
+        index,
+        name: info.name,
+        backend: info.backend.to_string(),
+        driver,
+        kind: match info.device_type {
+            wgpu::DeviceType::DiscreteGpu => "discrete",
+            wgpu::DeviceType::IntegratedGpu => "integrated",
+            wgpu::DeviceType::VirtualGpu => "virtual",
+            wgpu::DeviceType::Cpu => "software",
+            wgpu::DeviceType::Other => "other",
+        },
+        unusable: lacks(adapter, &limits),
+        limits,
+    }
+}
+
+/// What the kernel needs and the adapter does not have.
+fn lacks(adapter: &wgpu::Adapter, limits: &wgpu::Limits) -> Option<String> {
+    let flags = adapter.get_downlevel_capabilities().flags;
+    if !flags.contains(wgpu::DownlevelFlags::COMPUTE_SHADERS) {
+        return Some("no compute shaders".into());
+    }
+    let storage = adapter.get_texture_format_features(wgpu::TextureFormat::Rgba32Float);
+    if !storage.allowed_usages.contains(wgpu::TextureUsages::STORAGE_BINDING) {
+        return Some("no rgba32float storage textures".into());
+    }
+    let needs = [
+        ("storage textures a stage", limits.max_storage_textures_per_shader_stage, 3),
+        ("storage buffers a stage", limits.max_storage_buffers_per_shader_stage, 6),
+        ("invocations a workgroup", limits.max_compute_invocations_per_workgroup, 64),
+    ];
+    needs
+        .iter()
+        .find(|(_, has, needs)| has < needs)
+        .map(|(what, has, needs)| format!("{has} {what}, {needs} needed"))
+}
+
+/// All adapters, in the order in which `--device INDEX` counts them.
+#[must_use]
+pub fn list() -> Vec<AdapterSummary> {
+    adapters().into_iter().map(|(_, summary)| summary).collect()
+}
+
+/// What to do where there is no adapter.
+pub const DRIVER_ADVICE: &str = "to get one without a GPU, install Mesa's lavapipe \
+     (Debian and Ubuntu: apt-get install mesa-vulkan-drivers; Fedora: dnf install mesa-vulkan-drivers)";
+
+/// Opens an adapter.
+///
+/// # Errors
+/// [`Error::Device`] if there is none that fits, or it does not open.
+pub fn open(choice: &DeviceChoice) -> Result<Gpu> {
+    let adapters = adapters();
+    let known = || {
+        let names: Vec<String> =
+            adapters.iter().map(|(_, s)| format!("  {}: {} ({})", s.index, s.name, s.backend)).collect();
+        if names.is_empty() { "there is no adapter".into() } else { names.join("\n") }
+    };
+    let (adapter, summary) = match choice {
+        DeviceChoice::Best => adapters
+            .iter()
+            .filter(|(_, s)| s.unusable.is_none())
+            .min_by_key(|(_, s)| preference(s))
+            .ok_or_else(|| Error::Device(format!("no usable GPU adapter; {DRIVER_ADVICE}")))?,
+        DeviceChoice::Index(index) => adapters.get(*index).ok_or_else(|| {
+            Error::Device(format!("there is no device {index}; the devices are\n{}", known()))
+        })?,
+        DeviceChoice::Name(name) => adapters
+            .iter()
+            .filter(|(_, s)| s.name.to_lowercase().contains(&name.to_lowercase()))
+            .min_by_key(|(_, s)| preference(s))
+            .ok_or_else(|| {
+                Error::Device(format!("no device is called '{name}'; the devices are\n{}", known()))
+            })?,
+    };
+    if let Some(why) = &summary.unusable {
+        return Err(Error::Device(format!("device {} ({}) has {why}", summary.index, summary.name)));
+    }
+    let faults = Arc::new(Mutex::new(Vec::new()));
+    let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
+        label: Some("gpu-trace"),
+        required_limits: summary.limits.clone(),
+        ..Default::default()
+    }))
+    .map_err(|e| Error::Device(format!("device {} ({}) does not open: {e}", summary.index, summary.name)))?;
+    let sink = Arc::clone(&faults);
+    device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
+        let text = match error {
+            wgpu::Error::OutOfMemory { .. } => "the device is out of memory".to_owned(),
+            other => format!("the device reports: {other}"),
+        };
+        sink.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push(text);
+    }));
+    let sink = Arc::clone(&faults);
+    device.set_device_lost_callback(move |reason, message| {
+        if reason != wgpu::DeviceLostReason::Destroyed {
+            let text = format!("the device is lost: {message}");
+            sink.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push(text);
+        }
+    });
+    Ok(Gpu { device, queue, limits: summary.limits.clone(), summary: summary.clone(), faults })
+}
+
+/// Real GPUs first; of the same kind, the more direct interface first.
+fn preference(summary: &AdapterSummary) -> (usize, usize, usize) {
+    let place = |order: &[&str], of: &str| order.iter().position(|k| *k == of).unwrap_or(order.len());
+    (
+        place(&["discrete", "integrated", "virtual", "other", "software"], summary.kind),
+        place(&["vulkan", "metal", "dx12", "gl"], &summary.backend),
+        summary.index,
+    )
+}
+
+impl Gpu {
+    /// Says whether the device has reported a failure since it was opened.
+    ///
+    /// # Errors
+    /// [`Error::Gpu`] with all that it reported.
+    pub fn check(&self) -> Result<()> {
+        let faults = self.faults.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        if faults.is_empty() {
+            return Ok(());
+        }
+        Err(Error::Gpu(format!("{}: {}", self.summary.name, faults.join("; "))))
+    }
+
+    /// Waits until the queue is empty.
+    ///
+    /// # Errors
+    /// [`Error::Gpu`] if the device failed.
+    pub fn wait(&self) -> Result<()> {
+        let waited = self.device.poll(wgpu::PollType::wait_indefinitely());
+        self.check()?;
+        waited.map(|_| ()).map_err(|e| Error::Gpu(format!("{}: {e}", self.summary.name)))
+    }
+}

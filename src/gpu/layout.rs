@@ -1,0 +1,267 @@
+//! The structs that host and kernel share, in the kernel's layout.
+//!
+//! Structs of fixed layout are `bytemuck` structs; a test compares their offsets with naga's.
+//! `Material` and `Attributes` lose the members that no effect in use needs: they are written
+//! member by member at the offsets that naga reports.
+
+use bytemuck::{Pod, Zeroable};
+use glam::DVec3;
+
+use crate::effects::Effects;
+use crate::placement::{PlacedCamera, PlacedSphere};
+use crate::scene::{Material, MaterialKind};
+
+/// `Sphere` of `shaders/scene/list.wesl`: a sphere about its centre.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct SphereRecord {
+    /// Relative to the placement's origin.
+    pub center: [f32; 3],
+    /// Positive.
+    pub radius: f32,
+}
+
+impl SphereRecord {
+    /// The record of a sphere without a pole frame.
+    #[must_use]
+    pub fn new(sphere: &PlacedSphere) -> Self {
+        Self { center: sphere.anchor.as_vec3().to_array(), radius: sphere.radius as f32 }
+    }
+}
+
+/// `Pole` of `shaders/scene/list.wesl`: a sphere about its pole.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct PoleRecord {
+    /// The pole, relative to the placement's origin.
+    pub point: [f32; 3],
+    /// One over the radius.
+    pub curvature: f32,
+    /// Outward unit normal at the pole.
+    pub normal: [f32; 3],
+    /// Padding.
+    pub unused: f32,
+}
+
+impl PoleRecord {
+    /// The record of a sphere whose pole has the outward unit normal `normal`.
+    #[must_use]
+    pub fn new(sphere: &PlacedSphere, normal: DVec3) -> Self {
+        Self {
+            point: sphere.anchor.as_vec3().to_array(),
+            curvature: (1.0 / sphere.radius) as f32,
+            normal: normal.as_vec3().to_array(),
+            unused: 0.0,
+        }
+    }
+}
+
+/// `Camera` of `shaders/scene/camera.wesl`; see [`PlacedCamera`].
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+#[expect(missing_docs, reason = "the members are those of PlacedCamera")]
+pub struct CameraRecord {
+    pub anchor: [f32; 3],
+    pub approach: f32,
+    pub corner: [f32; 3],
+    pub focus: f32,
+    pub across: [f32; 3],
+    pub lens_share: f32,
+    pub down: [f32; 3],
+    pub unused0: f32,
+    pub forward: [f32; 3],
+    pub unused1: f32,
+    pub lens_across: [f32; 3],
+    pub unused2: f32,
+    pub lens_down: [f32; 3],
+    pub unused3: f32,
+}
+
+impl CameraRecord {
+    /// The camera rounded to f32.
+    #[must_use]
+    pub fn new(camera: &PlacedCamera) -> Self {
+        let vector = |v: DVec3| v.as_vec3().to_array();
+        Self {
+            anchor: vector(camera.anchor),
+            approach: camera.approach as f32,
+            corner: vector(camera.corner),
+            focus: camera.focus as f32,
+            across: vector(camera.across),
+            lens_share: camera.lens_share as f32,
+            down: vector(camera.down),
+            forward: vector(camera.forward),
+            lens_across: vector(camera.lens_across),
+            lens_down: vector(camera.lens_down),
+            ..Self::zeroed()
+        }
+    }
+}
+
+/// `Dispatch` of `shaders/path.wesl`: what one dispatch does.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct DispatchRecord {
+    /// Image pixel at the region's top left corner.
+    pub region_origin: [u32; 2],
+    /// Size of the region, in pixels.
+    pub region_size: [u32; 2],
+    /// First tile of the dispatch; tiles of a region are numbered by rows.
+    pub first_tile: u32,
+    /// One past the last tile.
+    pub end_tile: u32,
+    /// Low word of the first sample index.
+    pub first_sample: u32,
+    /// One past the last.
+    pub end_sample: u32,
+    /// Low word of the first sample index of the window.
+    pub window_start: u32,
+    /// Padding.
+    pub unused: u32,
+    /// See [`crate::settings::stream_words`].
+    pub stream: [u32; 2],
+}
+
+/// `Counters` of `shaders/path.wesl`.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub struct CountersRecord {
+    /// Samples that were no finite number.
+    pub non_finite: u32,
+    /// `u32::MAX` minus the lowest pixel number in the region that had one; 0: none.
+    pub first_pixel: u32,
+    /// Low word of a sample index there.
+    pub sample_low: u32,
+    /// Bounce at which it was seen.
+    pub bounce: u32,
+}
+
+/// All that a kernel may want to know of a material, rounded to f32.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MaterialRecord {
+    color: [f32; 3],
+    kind: u32,
+    emission: [f32; 3],
+    specular: [f32; 3],
+    epsilon: f32,
+    mu: f32,
+    lobe_weight: f32,
+    color_weight: f32,
+    ior: f32,
+}
+
+/// One member of a [`MaterialRecord`].
+enum Member<'a> {
+    Vector(&'a [f32; 3]),
+    Scalar(f32),
+    Unsigned(u32),
+}
+
+impl MaterialRecord {
+    /// The record of `material`.
+    #[must_use]
+    pub fn new(material: &Material) -> Self {
+        let vector = |v: DVec3| v.as_vec3().to_array();
+        let mut record = Self {
+            color: [0.0; 3],
+            kind: 0,
+            emission: vector(material.emission),
+            specular: [0.0; 3],
+            epsilon: 1.0,
+            mu: 0.0,
+            lobe_weight: 0.0,
+            color_weight: 0.0,
+            ior: 1.0,
+        };
+        match material.kind {
+            MaterialKind::Diffuse { albedo } => record.color = vector(albedo),
+            MaterialKind::Mirror { reflectance } => {
+                record.kind = 1;
+                record.color = vector(reflectance);
+            }
+            MaterialKind::Dielectric { ior } => {
+                record.kind = 2;
+                record.ior = ior as f32;
+            }
+            MaterialKind::Reflective { albedo, specular, epsilon, mu } => {
+                record.kind = 3;
+                record.color = vector(albedo);
+                record.specular = vector(specular);
+                record.epsilon = epsilon as f32;
+                record.mu = mu as f32;
+                record.lobe_weight = (lobe_albedo(epsilon, mu) * luminance(specular)) as f32;
+                record.color_weight = luminance(albedo) as f32;
+            }
+        }
+        record
+    }
+
+    /// The members that a kernel with `effects` has, in its order.
+    pub fn members(effects: &Effects) -> impl Iterator<Item = &'static str> {
+        let reflective = effects.has("reflective");
+        [
+            ("color", true),
+            ("kind", true),
+            ("emission", effects.has("emission")),
+            ("specular", reflective),
+            ("epsilon", reflective),
+            ("mu", reflective),
+            ("lobe_weight", reflective),
+            ("color_weight", reflective),
+            ("ior", effects.has("dielectric")),
+        ]
+        .into_iter()
+        .filter_map(|(name, used)| used.then_some(name))
+    }
+
+    fn member(&self, name: &str) -> Member<'_> {
+        match name {
+            "color" => Member::Vector(&self.color),
+            "kind" => Member::Unsigned(self.kind),
+            "emission" => Member::Vector(&self.emission),
+            "specular" => Member::Vector(&self.specular),
+            "epsilon" => Member::Scalar(self.epsilon),
+            "mu" => Member::Scalar(self.mu),
+            "lobe_weight" => Member::Scalar(self.lobe_weight),
+            "color_weight" => Member::Scalar(self.color_weight),
+            "ior" => Member::Scalar(self.ior),
+            other => unreachable!("no material member {other}"),
+        }
+    }
+
+    /// The member as a WGSL literal.
+    #[must_use]
+    pub fn literal(&self, name: &str) -> String {
+        match self.member(name) {
+            Member::Vector([x, y, z]) => format!("vec3f({x:?}f, {y:?}f, {z:?}f)"),
+            Member::Scalar(x) => format!("{x:?}f"),
+            Member::Unsigned(x) => format!("{x}u"),
+        }
+    }
+
+    /// The record's bytes in a struct with these member offsets and this size.
+    #[must_use]
+    pub fn bytes(&self, members: &[(String, u32)], size: u32) -> Vec<u8> {
+        let mut bytes = vec![0; size as usize];
+        for (name, offset) in members {
+            let value: &[u8] = match &self.member(name) {
+                Member::Vector(v) => bytemuck::cast_slice(&v[..]),
+                Member::Scalar(x) => &x.to_ne_bytes(),
+                Member::Unsigned(x) => &x.to_ne_bytes(),
+            };
+            bytes[*offset as usize..][..value.len()].copy_from_slice(value);
+        }
+        bytes
+    }
+}
+
+/// Albedo of the reflective lobe at normal incidence for specular = 1: its projected solid angle
+/// times mu.
+fn lobe_albedo(epsilon: f64, mu: f64) -> f64 {
+    mu * std::f64::consts::PI * epsilon * (2.0 - epsilon)
+}
+
+/// Relative luminance of linear RGB (ITU-R BT.709).
+fn luminance(v: DVec3) -> f64 {
+    v.dot(DVec3::new(0.2126, 0.7152, 0.0722))
+}

@@ -1,0 +1,5 @@
+//! The GPU: adapters, buffer layouts, and the renderer.
+
+pub mod device;
+pub mod layout;
+pub mod renderer;

@@ -1,0 +1,450 @@
+//! The GPU renderer: dispatches sized by time, sums continued in the order of the sample index.
+
+use std::ops::Range;
+use std::time::{Duration, Instant};
+
+use bytemuck::Zeroable as _;
+use wgpu::util::DeviceExt as _;
+
+use crate::effects::Effects;
+use crate::error::{Error, Result};
+use crate::film::{BLOCK, NonFinite, PixelSums, Tally, Window};
+use crate::gpu::device::Gpu;
+use crate::gpu::layout::{
+    CameraRecord, CountersRecord, DispatchRecord, MaterialRecord, PoleRecord, SphereRecord,
+};
+use crate::placement::Placement;
+use crate::render::{Control, Renderer};
+use crate::scene::Scene;
+use crate::settings::{Integrator, Rect, Settings, stream_words};
+use crate::shader::{Kernel, Stage, link};
+
+/// Pixels along the side of the kernel's tile.
+const TILE: u32 = 8;
+/// Longest side of a region, the unit of memory: images beyond it are rendered in pieces.
+const REGION: u32 = 1024;
+/// What a dispatch should take: short enough for every watchdog and for a smooth progress bar.
+const DISPATCH: Duration = Duration::from_millis(75);
+/// What all dispatches between two looks at the stop rules should take.
+const SLAB: Duration = Duration::from_millis(2000);
+/// Tiles that keep a GPU busy: below that a dispatch takes fewer samples instead.
+const BUSY_TILES: u32 = 64;
+
+/// Renders windows on a GPU.
+#[derive(Debug)]
+pub struct GpuRenderer {
+    gpu: Gpu,
+    kernel: Kernel,
+    crop: Rect,
+    seed: u64,
+    pipeline: wgpu::ComputePipeline,
+    bind_group: wgpu::BindGroup,
+    work: wgpu::Buffer,
+    counters: wgpu::Buffer,
+    region: RegionTargets,
+    /// Paths a second, from the last dispatch.
+    rate: f64,
+}
+
+/// Textures that the kernel writes and buffers through which they are read.
+#[derive(Debug)]
+struct RegionTargets {
+    textures: [wgpu::Texture; 3],
+    staging: [wgpu::Buffer; 3],
+    counters: wgpu::Buffer,
+}
+
+impl GpuRenderer {
+    /// Links the kernel, uploads the scene and compiles the pipeline.
+    ///
+    /// # Errors
+    /// [`Error::Gpu`] if the image or the scene is beyond a limit of the device, or it fails.
+    pub fn new(
+        gpu: Gpu,
+        scene: &Scene,
+        placement: &Placement,
+        effects: &Effects,
+        settings: &Settings,
+    ) -> Result<Self> {
+        let kernel = link(Stage::Path, scene, placement, effects)?;
+        let device = &gpu.device;
+        let side = REGION.min(gpu.limits.max_texture_dimension_2d);
+        let (width, height) = (settings.crop.width.min(side), settings.crop.height.min(side));
+        let (_, partial_size) = kernel
+            .struct_members("Partial")
+            .ok_or_else(|| Error::Shader("the kernel has no struct Partial".into()))?;
+
+        let uniform = |label, contents: &[u8]| {
+            device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+                label: Some(label),
+                contents,
+                usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+            })
+        };
+        let camera = uniform("camera", bytemuck::bytes_of(&CameraRecord::new(&placement.camera)));
+        let work = uniform("work", bytemuck::bytes_of(&DispatchRecord::zeroed()));
+        let buffer = |label, size: u64, usage| {
+            device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some(label),
+                size,
+                usage,
+                mapped_at_creation: false,
+            })
+        };
+        let pixels = u64::from(width) * u64::from(height);
+        let partials_size = pixels * u64::from(partial_size);
+        let storage = Uploads::new(&kernel, scene, placement, effects);
+        storage.check(&gpu.limits, partials_size)?;
+        let partials = buffer("partials", partials_size, wgpu::BufferUsages::STORAGE);
+        let counter_usage = wgpu::BufferUsages::STORAGE
+            | wgpu::BufferUsages::COPY_SRC
+            | wgpu::BufferUsages::COPY_DST;
+        let counters = buffer("counters", size_of::<CountersRecord>() as u64, counter_usage);
+        let region = RegionTargets::new(device, width, height);
+        let views =
+            region.textures.each_ref().map(|t| t.create_view(&wgpu::TextureViewDescriptor::default()));
+
+        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: Some("path"),
+            source: wgpu::ShaderSource::Wgsl(kernel.wgsl.as_str().into()),
+        });
+        let mut constants = vec![("MAX_BOUNCES", f64::from(settings.max_bounces))];
+        if let Integrator::Lecture { termination } = settings.integrator {
+            constants.push(("TERMINATION", termination));
+        }
+        let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label: Some("path"),
+            layout: None,
+            module: &module,
+            entry_point: Some("render"),
+            compilation_options: wgpu::PipelineCompilationOptions {
+                constants: &constants,
+                ..Default::default()
+            },
+            cache: None,
+        });
+        let uploaded = storage.create(device);
+        let mut entries = vec![
+            (4, camera.as_entire_binding()),
+            (5, work.as_entire_binding()),
+            (6, partials.as_entire_binding()),
+            (7, counters.as_entire_binding()),
+        ];
+        entries.extend(uploaded.iter().map(|(binding, b)| (*binding, b.as_entire_binding())));
+        entries.extend(
+            (8..).zip(&views).map(|(i, view)| (i, wgpu::BindingResource::TextureView(view))),
+        );
+        let entries: Vec<wgpu::BindGroupEntry<'_>> = entries
+            .into_iter()
+            .filter(|(binding, _)| kernel.has_binding(*binding))
+            .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource })
+            .collect();
+        let bind_group = device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("path"),
+            layout: &pipeline.get_bind_group_layout(0),
+            entries: &entries,
+        });
+        gpu.check()?;
+        let mut renderer = Self {
+            gpu,
+            kernel,
+            crop: settings.crop,
+            seed: settings.seed,
+            pipeline,
+            bind_group,
+            work,
+            counters,
+            region,
+            rate: 1.0e6,
+        };
+        // Some drivers compile at the first dispatch: one that does nothing takes that out of the
+        // rendering's time.
+        renderer.dispatch(&DispatchRecord::zeroed(), 1)?;
+        Ok(renderer)
+    }
+
+    /// The kernel in use.
+    #[must_use]
+    pub fn kernel(&self) -> &Kernel {
+        &self.kernel
+    }
+
+    fn dispatch(&mut self, record: &DispatchRecord, tiles: u32) -> Result<()> {
+        self.gpu.queue.write_buffer(&self.work, 0, bytemuck::bytes_of(record));
+        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+        {
+            let mut pass = encoder.begin_compute_pass(&Default::default());
+            pass.set_pipeline(&self.pipeline);
+            pass.set_bind_group(0, &self.bind_group, &[]);
+            let across = tiles.min(self.gpu.limits.max_compute_workgroups_per_dimension);
+            pass.dispatch_workgroups(across, tiles.div_ceil(across), 1);
+        }
+        self.gpu.queue.submit([encoder.finish()]);
+        self.gpu.wait()
+    }
+
+    /// Renders `samples` of `region`, or fewer if it may stop and `control` says so between two
+    /// slabs; returns the end that was reached.
+    fn render_region(
+        &mut self,
+        region: Rect,
+        samples: Range<u64>,
+        may_stop: bool,
+        control: &mut dyn Control,
+    ) -> Result<u64> {
+        let tiles = region.width.div_ceil(TILE) * region.height.div_ceil(TILE);
+        let mut record = DispatchRecord {
+            region_origin: [region.x, region.y],
+            region_size: [region.width, region.height],
+            window_start: samples.start as u32,
+            stream: stream_words(self.seed, (samples.start >> 32) as u32),
+            ..DispatchRecord::zeroed()
+        };
+        let mut start = samples.start;
+        while start < samples.end {
+            let end = self.slab_end(start..samples.end, region.pixels() as f64);
+            record.first_sample = start as u32;
+            record.end_sample = end as u32;
+            let mut proceed = true;
+            let mut first = 0;
+            while first < tiles {
+                let count = self.tile_count(end - start).min(tiles - first);
+                record.first_tile = first;
+                record.end_tile = first + count;
+                let before = Instant::now();
+                self.dispatch(&record, count)?;
+                let paths = f64::from(count) * f64::from(TILE * TILE) * (end - start) as f64;
+                self.rate = paths / before.elapsed().as_secs_f64().max(1.0e-6);
+                first += count;
+                let share = f64::from(count) / f64::from(tiles);
+                let done = share * region.pixels() as f64 * (end - start) as f64;
+                proceed &= control.proceed(done as u64);
+            }
+            start = end;
+            if may_stop && !proceed {
+                break;
+            }
+        }
+        Ok(start)
+    }
+
+    /// Where a slab that starts with `samples` ends: equal parts of what is left, by time.
+    fn slab_end(&self, samples: Range<u64>, pixels: f64) -> u64 {
+        let left = samples.end - samples.start;
+        let fit = self.rate * SLAB.as_secs_f64() / pixels;
+        let busy = self.rate * DISPATCH.as_secs_f64() / f64::from(BUSY_TILES * TILE * TILE);
+        let parts = (left as f64 / fit.min(busy.max(BLOCK as f64))).ceil().max(1.0);
+        let length = (left as f64 / parts).ceil() as u64;
+        // Slabs end where blocks do.
+        (samples.start + length).next_multiple_of(BLOCK).min(samples.end)
+    }
+
+    fn tile_count(&self, samples: u64) -> u32 {
+        let paths = self.rate * DISPATCH.as_secs_f64();
+        let count = paths / (f64::from(TILE * TILE) * samples as f64);
+        (count as u32).max(1)
+    }
+
+    /// Reads back what the kernel left for `region`.
+    fn read(&mut self, region: Rect, samples: &Range<u64>) -> Result<(Vec<PixelSums>, Tally)> {
+        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+        let stride = row_stride(region.width);
+        for (texture, staging) in self.region.textures.iter().zip(&self.region.staging) {
+            encoder.copy_texture_to_buffer(
+                texture.as_image_copy(),
+                wgpu::TexelCopyBufferInfo {
+                    buffer: staging,
+                    layout: wgpu::TexelCopyBufferLayout {
+                        offset: 0,
+                        bytes_per_row: Some(stride),
+                        rows_per_image: None,
+                    },
+                },
+                wgpu::Extent3d {
+                    width: region.width,
+                    height: region.height,
+                    depth_or_array_layers: 1,
+                },
+            );
+        }
+        let size = size_of::<CountersRecord>() as u64;
+        encoder.copy_buffer_to_buffer(&self.counters, 0, &self.region.counters, 0, size);
+        encoder.clear_buffer(&self.counters, 0, None);
+        self.gpu.queue.submit([encoder.finish()]);
+        for buffer in self.region.staging.iter().chain([&self.region.counters]) {
+            // Whether it worked shows when the range is taken.
+            buffer.map_async(wgpu::MapMode::Read, .., |_| ());
+        }
+        self.gpu.wait()?;
+        let lost = |e| Error::Gpu(format!("{}: no data came back: {e}", self.gpu.summary.name));
+        let mut pixels = vec![PixelSums::default(); region.pixels()];
+        let mut tally = Tally::default();
+        {
+            let [high, low, deviation] = self.region.staging.each_ref().map(|b| b.get_mapped_range(..));
+            let (high, low, deviation) = (high.map_err(lost)?, low.map_err(lost)?, deviation.map_err(lost)?);
+            for y in 0..region.height {
+                let row = (y * stride) as usize..;
+                let row = |bytes: &wgpu::BufferView| -> Vec<[f32; 4]> {
+                    bytemuck::cast_slice(&bytes[row.clone()][..region.width as usize * 16]).to_vec()
+                };
+                let (high, low, deviation) = (row(&high), row(&low), row(&deviation));
+                for x in 0..region.width as usize {
+                    let pixel = &mut pixels[(y * region.width) as usize + x];
+                    for c in 0..3 {
+                        pixel.sum[c] = f64::from(high[x][c]) + f64::from(low[x][c]);
+                        pixel.m2[c] = f64::from(deviation[x][c]);
+                    }
+                    tally.rays += high[x][3] as u64;
+                    tally.cut_throughput += f64::from(low[x][3]);
+                    tally.cut_paths += deviation[x][3] as u64;
+                }
+            }
+            let counters = self.region.counters.get_mapped_range(..).map_err(lost)?;
+            let counters: CountersRecord = *bytemuck::from_bytes(&counters);
+            if counters.non_finite > 0 {
+                let number = u32::MAX - counters.first_pixel;
+                tally.non_finite = u64::from(counters.non_finite);
+                tally.first_non_finite = Some(NonFinite {
+                    pixel: [region.x + number % region.width, region.y + number / region.width],
+                    sample: (samples.start >> 32 << 32) + u64::from(counters.sample_low),
+                    bounce: counters.bounce,
+                });
+            }
+        }
+        for buffer in self.region.staging.iter().chain([&self.region.counters]) {
+            buffer.unmap();
+        }
+        self.gpu.check()?;
+        Ok((pixels, tally))
+    }
+}
+
+impl Renderer for GpuRenderer {
+    fn device(&self) -> (String, String, String) {
+        let s = &self.gpu.summary;
+        (s.name.clone(), s.backend.clone(), s.driver.clone())
+    }
+
+    fn render(&mut self, samples: Range<u64>, control: &mut dyn Control) -> Result<Window> {
+        let mut window = Window {
+            rect: self.crop,
+            samples,
+            pixels: vec![PixelSums::default(); self.crop.pixels()],
+            tally: Tally::default(),
+        };
+        let side = REGION.min(self.gpu.limits.max_texture_dimension_2d);
+        for (i, region) in self.crop.pieces(side).enumerate() {
+            // All pieces get the samples that the first one got.
+            let wanted = window.samples.clone();
+            window.samples.end = self.render_region(region, wanted, i == 0, control)?;
+            let (pixels, tally) = self.read(region, &window.samples)?;
+            window.tally.add(&tally);
+            for (y, row) in pixels.chunks(region.width as usize).enumerate() {
+                let line = (region.y - self.crop.y) as usize + y;
+                let from = line * self.crop.width as usize + (region.x - self.crop.x) as usize;
+                window.pixels[from..from + row.len()].copy_from_slice(row);
+            }
+        }
+        Ok(window)
+    }
+}
+
+impl RegionTargets {
+    fn new(device: &wgpu::Device, width: u32, height: u32) -> Self {
+        let texture = |label| {
+            device.create_texture(&wgpu::TextureDescriptor {
+                label: Some(label),
+                size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D2,
+                format: wgpu::TextureFormat::Rgba32Float,
+                usage: wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::COPY_SRC,
+                view_formats: &[],
+            })
+        };
+        let staging = |size: u64| {
+            device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("staging"),
+                size,
+                usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
+                mapped_at_creation: false,
+            })
+        };
+        let size = u64::from(row_stride(width)) * u64::from(height);
+        Self {
+            textures: ["sum_high", "sum_low", "deviations"].map(texture),
+            staging: [size; 3].map(staging),
+            counters: staging(size_of::<CountersRecord>() as u64),
+        }
+    }
+}
+
+/// Bytes from a row of rgba32float texels to the next in a buffer.
+fn row_stride(width: u32) -> u32 {
+    (width * 16).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT)
+}
+
+/// The scene's storage buffers, before they are on the device.
+struct Uploads(Vec<(u32, &'static str, Vec<u8>)>);
+
+impl Uploads {
+    fn new(kernel: &Kernel, scene: &Scene, placement: &Placement, effects: &Effects) -> Self {
+        let mut all: Vec<(u32, &'static str, Vec<u8>)> = Vec::new();
+        if effects.has("baked") {
+            return Self(all);
+        }
+        let (poles, centered) = placement.spheres.split_at(placement.poles);
+        let spheres: Vec<SphereRecord> = centered.iter().map(SphereRecord::new).collect();
+        let poles: Vec<PoleRecord> =
+            poles.iter().filter_map(|s| Some(PoleRecord::new(s, s.pole?))).collect();
+        let mut attributes: Vec<u32> = Vec::new();
+        for sphere in &placement.spheres {
+            attributes.push(sphere.material as u32);
+            if effects.has("interior") {
+                attributes.push(sphere.side as u32);
+            }
+        }
+        all.push((0, "spheres", bytemuck::cast_slice(&spheres).to_vec()));
+        all.push((1, "poles", bytemuck::cast_slice(&poles).to_vec()));
+        all.push((2, "attributes", bytemuck::cast_slice(&attributes).to_vec()));
+        if let Some((members, size)) = kernel.struct_members("Material") {
+            let materials = scene.materials.iter();
+            let bytes = materials.flat_map(|m| MaterialRecord::new(m).bytes(&members, size));
+            all.push((3, "materials", bytes.collect()));
+        }
+        // A binding of size zero is not allowed; what it holds is never read.
+        for (_, _, bytes) in &mut all {
+            if bytes.is_empty() {
+                bytes.resize(64, 0);
+            }
+        }
+        Self(all)
+    }
+
+    fn check(&self, limits: &wgpu::Limits, partials: u64) -> Result<()> {
+        let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+        let sizes = self.0.iter().map(|(_, name, bytes)| (*name, bytes.len() as u64));
+        for (name, size) in sizes.chain([("partial sums", partials)]) {
+            if size > most {
+                return Err(Error::Gpu(format!(
+                    "the {name} need {size} bytes, more than the device's limit of {most} for one \
+                     buffer; --backend cpu has no such limit"
+                )));
+            }
+        }
+        Ok(())
+    }
+
+    fn create(&self, device: &wgpu::Device) -> Vec<(u32, wgpu::Buffer)> {
+        let create = |(binding, label, contents): &(u32, &'static str, Vec<u8>)| {
+            let buffer = device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+                label: Some(label),
+                contents,
+                usage: wgpu::BufferUsages::STORAGE,
+            });
+            (*binding, buffer)
+        };
+        self.0.iter().map(create).collect()
+    }
+}

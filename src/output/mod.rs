@@ -1,0 +1,117 @@
+//! What a render leaves behind: images (`.png`, `.exr`, `.npy`), the statistics as JSON, and the
+//! progress on stderr.
+//!
+//! Every target is checked before any work starts ([`check_all`]) and replaced in one step once its
+//! content is complete ([`write_all`]), so that neither a typing error nor a full disk costs a
+//! render or an older result.
+
+pub mod atomic;
+pub mod exr;
+pub mod metadata;
+pub mod npy;
+pub mod png;
+pub mod progress;
+pub mod stats;
+mod target;
+
+pub use exr::Layer;
+pub use metadata::{Metadata, Value};
+pub use npy::read_npy;
+pub use progress::{Progress, ProgressMode, Snapshot};
+pub use stats::Stats;
+pub use target::{Format, Target, check_all};
+
+use std::io;
+
+use crate::error::{Error, Result};
+
+/// An image in linear RGB with the primaries of sRGB (Rec. 709), in the unit of radiance.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Picture {
+    /// Columns, at least 1.
+    pub width: u32,
+    /// Rows, at least 1.
+    pub height: u32,
+    /// `width * height` values of red, green and blue, row by row from the top left.
+    pub pixels: Vec<[f32; 3]>,
+}
+
+impl Picture {
+    /// Joins a size and the pixels that fill it.
+    ///
+    /// # Panics
+    /// If the size is zero or `pixels` does not hold `width * height` values: a defect of the
+    /// caller, for files are checked where they are read.
+    #[must_use]
+    pub fn new(width: u32, height: u32, pixels: Vec<[f32; 3]>) -> Self {
+        assert!(
+            width > 0 && height > 0,
+            "an image of {width}x{height} pixels"
+        );
+        assert_eq!(
+            pixels.len() as u64,
+            u64::from(width) * u64::from(height),
+            "the number of pixels of an image of {width}x{height}"
+        );
+        Self {
+            width,
+            height,
+            pixels,
+        }
+    }
+}
+
+/// Everything that an image file can say about a render. Each format takes what it can hold.
+#[derive(Clone, Copy, Debug)]
+pub struct Contents<'a> {
+    /// The image: all formats.
+    pub picture: &'a Picture,
+    /// Further channels beside `R G B`, of the same size: EXR only.
+    pub layers: &'a [Layer<'a>],
+    /// How the image was made: EXR attributes, PNG text; `.npy` has no place for it.
+    pub metadata: &'a Metadata,
+    /// EV steps that brighten the image, a factor of `2^exposure`: PNG only, the others stay linear.
+    pub exposure: f64,
+}
+
+impl Contents<'_> {
+    /// The bytes of a file.
+    ///
+    /// # Errors
+    /// What the encoder refuses: a size beyond the format's limits, layers of another size than the
+    /// picture or with a channel name that is used twice.
+    pub fn encode(&self, format: Format) -> io::Result<Vec<u8>> {
+        match format {
+            Format::Png => png::encode(self.picture, self.exposure, self.metadata),
+            Format::Exr => exr::encode(self.picture, self.layers, self.metadata),
+            Format::Npy => Ok(npy::encode(self.picture)),
+        }
+    }
+}
+
+/// Writes the render to every target, each in one step.
+///
+/// # Errors
+/// [`Error::File`] for the first target that could not be written; its text also names the others
+/// that failed. A failure does not keep the remaining targets from being written: a long render
+/// should leave as much as it can.
+pub fn write_all(targets: &[Target], contents: &Contents<'_>) -> Result<()> {
+    let mut failures = targets.iter().filter_map(|target| {
+        let written = contents
+            .encode(target.format)
+            .and_then(|bytes| atomic::replace(&target.path, &bytes));
+        written.err().map(|error| (target, error))
+    });
+    let Some((first, mut source)) = failures.next() else {
+        return Ok(());
+    };
+    for (target, error) in failures {
+        let text = format!("{source}; cannot write {}: {error}", target.path.display());
+        source = io::Error::new(source.kind(), text);
+    }
+    Err(Error::File {
+        action: "cannot write",
+        path: first.path.clone(),
+        source,
+    })
+}

@@ -1,0 +1,162 @@
+//! What a render did, in numbers: the JSON of `--stats`.
+
+use std::io;
+use std::path::Path;
+
+use serde::Serialize;
+
+use super::{Metadata, atomic};
+use crate::error::{Error, Result};
+
+/// All that is known of a finished render. The names are those of the JSON, which users' scripts
+/// rely on: add members, but rename and remove none.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Stats {
+    /// The version of this program.
+    pub version: String,
+    /// The scene's file as it was typed, or the name of a built-in scene.
+    pub scene: String,
+    /// Identifies the scene's content.
+    pub scene_hash: String,
+    /// Selects the random numbers.
+    pub seed: u64,
+    /// The samples of each pixel that were taken: first, and one past the last.
+    pub sample_range: [u64; 2],
+    /// Samples per pixel that were taken.
+    pub spp: u64,
+    /// Columns of the image.
+    pub width: u32,
+    /// Rows of the image.
+    pub height: u32,
+    /// What rendered: `gpu` or `cpu`.
+    pub backend: String,
+    /// The device that rendered.
+    pub device: Device,
+    /// The names of the effects in the kernel.
+    pub effects: Vec<String>,
+    /// The form of the geometry: `baked`, `list` or `bvh`.
+    pub geometry: String,
+    /// The name of the integrator.
+    pub integrator: String,
+    /// The name of the sampler.
+    pub sampler: String,
+    /// The most scattering events of a path.
+    pub max_bounces: u32,
+    /// Whether paths ended by Russian roulette.
+    pub roulette: bool,
+    /// Where the time went.
+    pub seconds: Seconds,
+    /// Paths that were started, over all pixels.
+    pub samples: u64,
+    /// `samples` over the time of rendering.
+    pub paths_per_second: f64,
+    /// Rays that were traced, shadow rays too.
+    pub rays: u64,
+    /// The relative error, a fraction; `null` where unknown.
+    pub estimated_error: Option<f64>,
+    /// Whether no light at all was found, which leaves the error without meaning.
+    pub black: bool,
+    /// Samples that were not finite.
+    pub non_finite: u64,
+    /// What the limit on bounces cut off.
+    pub bounce_limit: BounceLimit,
+    /// What ended the render.
+    pub stopped_by: StoppedBy,
+    /// What the user was warned of, in order.
+    pub warnings: Vec<String>,
+}
+
+/// A device as the system names it.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Device {
+    /// The product.
+    pub name: String,
+    /// The interface to it: `vulkan`, `metal`, `dx12`, `gl` or `cpu`.
+    pub backend: String,
+    /// The driver and its version; empty where there is none.
+    pub driver: String,
+}
+
+/// Wall-clock times, in seconds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Seconds {
+    /// From the start to the last image.
+    pub total: f64,
+    /// Loading the scene and opening the device.
+    pub setup: f64,
+    /// Linking and compiling the kernel.
+    pub compile: f64,
+    /// Tracing paths.
+    pub render: f64,
+}
+
+/// Paths that the limit on bounces ended while they could still have found light.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct BounceLimit {
+    /// How many.
+    pub paths: u64,
+    /// Their throughput, summed.
+    pub throughput: f64,
+    /// A bound on the share of the image's energy that they could have brought, a fraction; `null`
+    /// where no bound is known.
+    pub energy_at_most: Option<f64>,
+}
+
+/// What ended a render: whichever came first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum StoppedBy {
+    /// All samples were taken.
+    Spp,
+    /// The error fell to what was asked for.
+    Error,
+    /// The time was up.
+    Time,
+    /// The user or the system said so.
+    Interrupt,
+}
+
+impl Stats {
+    /// Indented JSON that ends with a line feed. Numbers that are not finite become `null`.
+    ///
+    /// # Errors
+    /// None that are known: no member can fail to serialise.
+    pub fn to_json(&self) -> io::Result<String> {
+        let mut json = serde_json::to_string_pretty(self)?;
+        json.push('\n');
+        Ok(json)
+    }
+
+    /// Writes the JSON, all or nothing.
+    ///
+    /// # Errors
+    /// [`Error::File`] if the file cannot be written; an older one is then unchanged.
+    pub fn write(&self, path: &Path) -> Result<()> {
+        self.to_json()
+            .and_then(|json| atomic::replace(path, json.as_bytes()))
+            .map_err(|source| Error::File {
+                action: "cannot write",
+                path: path.to_path_buf(),
+                source,
+            })
+    }
+
+    /// What image files say about how they were made.
+    #[must_use]
+    pub fn metadata(&self) -> Metadata {
+        let [start, end] = self.sample_range;
+        Metadata::new()
+            .with("version", self.version.as_str())
+            .with("scene", self.scene.as_str())
+            .with("scene_hash", self.scene_hash.as_str())
+            .with("seed", self.seed)
+            .with("sample_range", format!("{start}..{end}"))
+            .with("spp", self.spp)
+            .with("integrator", self.integrator.as_str())
+            .with("sampler", self.sampler.as_str())
+            .with("max_bounces", self.max_bounces)
+            .with("device", self.device.name.as_str())
+            .with("backend", self.device.backend.as_str())
+            .with("seconds", self.seconds.total)
+    }
+}

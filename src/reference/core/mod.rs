@@ -1,0 +1,3 @@
+//! Twins of `shaders/core/`.
+
+pub mod random;

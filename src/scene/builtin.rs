@@ -1,0 +1,89 @@
+//! The gallery: scenes that are part of the program.
+
+use std::path::{MAIN_SEPARATOR, Path};
+
+use super::load::{Loaded, load_file, load_str};
+use super::suggest::nearest;
+use crate::error::{Error, Result};
+
+/// The scene that is rendered when none is named.
+pub const DEFAULT: &str = "lecture";
+
+/// A scene that is part of the program.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Builtin {
+    /// Its name on the command line.
+    pub name: &'static str,
+    /// What it shows, in one line.
+    pub description: &'static str,
+    /// The scene file.
+    pub text: &'static str,
+}
+
+/// All built-in scenes, the default one first.
+pub const GALLERY: &[Builtin] = &[
+    Builtin {
+        name: DEFAULT,
+        description: "the lecture's room: two diffuse spheres between walls of radius 1000",
+        text: include_str!("../../scenes/lecture.toml"),
+    },
+    Builtin {
+        name: "lecture-reflective",
+        description: "the same with the lecture's reflective material on three of its spheres",
+        text: include_str!("../../scenes/lecture-reflective.toml"),
+    },
+    Builtin {
+        name: "glass",
+        description: "a mirror ball and a glass ball in a room of huge spheres, with a caustic",
+        text: include_str!("../../scenes/glass.toml"),
+    },
+    Builtin {
+        name: "field",
+        description: "480 spheres of all materials under a sky, through a thin lens",
+        text: include_str!("../../scenes/field.toml"),
+    },
+];
+
+/// The names of the built-in scenes, the default one first.
+pub fn names() -> impl Iterator<Item = &'static str> {
+    GALLERY.iter().map(|builtin| builtin.name)
+}
+
+/// The built-in scene of that name.
+#[must_use]
+pub fn get(name: &str) -> Option<&'static Builtin> {
+    GALLERY.iter().find(|builtin| builtin.name == name)
+}
+
+/// The scene that a command line's `SCENE` means.
+///
+/// Nothing means the default scene. A word with a path separator or ending in `.toml` is always a
+/// file. Any other word is an existing file, else a built-in scene.
+///
+/// # Errors
+/// Those of [`load_file`], and [`Error::Usage`] for a word that is neither.
+pub fn resolve(argument: Option<&str>) -> Result<Loaded> {
+    let word = argument.unwrap_or(DEFAULT);
+    let separator = word.contains('/') || word.contains(MAIN_SEPARATOR);
+    let path = Path::new(word);
+    let toml = path
+        .extension()
+        .is_some_and(|extension| extension.eq_ignore_ascii_case("toml"));
+    // A directory that happens to be called like a built-in scene does not hide it.
+    if argument.is_some() && (separator || toml || path.is_file()) {
+        return load_file(path);
+    }
+    if let Some(builtin) = get(word) {
+        return load_str(builtin.name, builtin.text);
+    }
+    if path.exists() {
+        return load_file(path);
+    }
+    let known = names().collect::<Vec<_>>().join(", ");
+    let meant =
+        nearest(word, names()).map_or_else(String::new, |name| format!("; did you mean `{name}`?"));
+    Err(Error::Usage(format!(
+        "no scene `{}`: neither a file nor a built-in scene ({known}){meant}",
+        word.escape_debug()
+    )))
+}

@@ -1,0 +1,145 @@
+//! A scene in words, for `scene check`.
+
+use std::collections::BTreeMap;
+use std::fmt::{self, Write};
+
+use glam::DVec3;
+
+use super::load::Loaded;
+use super::{Handedness, MaterialKind, Scene};
+
+/// So many lights are listed one by one.
+const LIGHTS_LISTED: usize = 8;
+
+impl MaterialKind {
+    /// The name of the kind in a scene file, which is also the name of its effect.
+    #[must_use]
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Diffuse { .. } => "diffuse",
+            Self::Mirror { .. } => "mirror",
+            Self::Dielectric { .. } => "dielectric",
+            Self::Reflective { .. } => "reflective",
+        }
+    }
+}
+
+/// The summary that `scene check` prints: image, camera, spheres by material, lights. Lines end
+/// with a newline; the warnings are not in it.
+#[must_use]
+pub fn summary(loaded: &Loaded) -> String {
+    let mut text = String::new();
+    // Writing to a String cannot fail.
+    let _ = write(&mut text, loaded);
+    text
+}
+
+fn write(text: &mut String, loaded: &Loaded) -> fmt::Result {
+    let scene = &loaded.scene;
+    writeln!(text, "scene        {} ({})", loaded.name, loaded.hash)?;
+    write!(
+        text,
+        "image        {} x {} pixels",
+        scene.width, scene.height
+    )?;
+    if let Some(spp) = scene.render.spp {
+        write!(text, ", {spp} samples a pixel")?;
+    }
+    if let Some(bounces) = scene.render.max_bounces {
+        write!(text, ", at most {bounces} bounces")?;
+    }
+    writeln!(text)?;
+    camera(text, scene)?;
+    writeln!(text, "spheres      {}", scene.spheres.len())?;
+
+    let mut counts: BTreeMap<&str, (usize, usize)> = BTreeMap::new();
+    for sphere in &scene.spheres {
+        counts
+            .entry(scene.materials[sphere.material].kind.name())
+            .or_default()
+            .0 += 1;
+    }
+    for material in &scene.materials {
+        counts.entry(material.kind.name()).or_default().1 += 1;
+    }
+    for (kind, (spheres, materials)) in counts {
+        let spheres = counted(spheres, "sphere");
+        writeln!(
+            text,
+            "  {kind:<10} {spheres}, {}",
+            counted(materials, "material")
+        )?;
+    }
+    lights(text, scene)
+}
+
+fn camera(text: &mut String, scene: &Scene) -> fmt::Result {
+    let camera = &scene.camera;
+    write!(
+        text,
+        "camera       at {} to {}, fov {} degrees, {}",
+        triple(camera.position),
+        triple(camera.look_at),
+        camera.fov,
+        match camera.handedness {
+            Handedness::Right => "right-handed",
+            Handedness::Left => "left-handed",
+        }
+    )?;
+    if camera.aperture_radius > 0.0 {
+        let (radius, distance) = (camera.aperture_radius, camera.focus_distance);
+        writeln!(text, ", lens of radius {radius} focused at {distance}")
+    } else {
+        writeln!(text, ", pinhole")
+    }
+}
+
+fn lights(text: &mut String, scene: &Scene) -> fmt::Result {
+    let mut by_material: BTreeMap<usize, usize> = BTreeMap::new();
+    for sphere in &scene.spheres {
+        if scene.materials[sphere.material].emission != DVec3::ZERO {
+            *by_material.entry(sphere.material).or_default() += 1;
+        }
+    }
+    let spheres: usize = by_material.values().sum();
+    match (spheres, scene.environment) {
+        (0, None) => writeln!(text, "lights       none")?,
+        (0, Some(_)) => writeln!(text, "lights       the environment")?,
+        (count, None) => writeln!(text, "lights       {}", counted(count, "sphere"))?,
+        (count, Some(_)) => writeln!(
+            text,
+            "lights       the environment and {}",
+            counted(count, "sphere")
+        )?,
+    }
+    if let Some(radiance) = scene.environment {
+        writeln!(text, "  environment with radiance {}", triple(radiance))?;
+    }
+    for (&index, &count) in by_material.iter().take(LIGHTS_LISTED) {
+        let material = &scene.materials[index];
+        let emission = triple(material.emission);
+        let spheres = counted(count, "sphere");
+        writeln!(
+            text,
+            "  {} with radiance {emission}: {spheres}",
+            material.name
+        )?;
+    }
+    if by_material.len() > LIGHTS_LISTED {
+        writeln!(
+            text,
+            "  and {} more materials",
+            by_material.len() - LIGHTS_LISTED
+        )?;
+    }
+    Ok(())
+}
+
+fn triple(vector: DVec3) -> String {
+    format!("({}, {}, {})", vector.x, vector.y, vector.z)
+}
+
+fn counted(count: usize, noun: &str) -> String {
+    let plural = if count == 1 { "" } else { "s" };
+    format!("{count} {noun}{plural}")
+}

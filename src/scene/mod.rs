@@ -1,0 +1,136 @@
+//! What is to be rendered: camera, spheres, materials, environment.
+//!
+//! A [`Scene`] is validated when it exists: every number is finite and in its range, every
+//! material index is in bounds. Lengths are in scene units, radiances in W/(sr m²) per colour
+//! channel (linear RGB), and everything is f64: rounding to f32 happens in one later place only.
+
+pub mod builtin;
+mod describe;
+mod file;
+mod hash;
+pub mod load;
+mod range;
+mod report;
+mod shape;
+mod suggest;
+mod validate;
+
+pub use describe::summary;
+pub use file::{MAX_BOUNCES, MAX_MAGNITUDE, MAX_SIDE, MAX_SPP, json_schema};
+pub use hash::content_hash;
+pub use load::Loaded;
+
+use glam::DVec3;
+
+/// A validated scene. Built by the scene loader (`scene::load`) or from the gallery
+/// (`scene::builtin`).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scene {
+    /// The camera.
+    pub camera: Camera,
+    /// Width of the image, in pixels; at least 1.
+    pub width: u32,
+    /// Height of the image, in pixels; at least 1.
+    pub height: u32,
+    /// What the scene file's `[render]` table asks for; the command line wins.
+    pub render: RenderDefaults,
+    /// Radiance of the constant environment; `None` is black, and costs nothing.
+    pub environment: Option<DVec3>,
+    /// All materials, in file order.
+    pub materials: Vec<Material>,
+    /// All spheres, in file order.
+    pub spheres: Vec<Sphere>,
+}
+
+/// Rendering options that a scene file may set.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct RenderDefaults {
+    /// Samples a pixel.
+    pub spp: Option<u64>,
+    /// The largest number of scattering events of a path.
+    pub max_bounces: Option<u32>,
+}
+
+/// A pinhole or thin-lens camera.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Camera {
+    /// Centre of the lens.
+    pub position: DVec3,
+    /// A point on the view axis, different from `position`.
+    pub look_at: DVec3,
+    /// Upward direction, not parallel to the view axis; need not be normalised.
+    pub up: DVec3,
+    /// Full vertical angle of view, in degrees, in (0, 180).
+    pub fov: f64,
+    /// Which way image right is.
+    pub handedness: Handedness,
+    /// Radius of the thin lens; 0 is a pinhole.
+    pub aperture_radius: f64,
+    /// Distance of the plane in focus along the view axis; positive. Unused by a pinhole.
+    pub focus_distance: f64,
+}
+
+/// Which way image right is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Handedness {
+    /// Image right is forward × up.
+    Right,
+    /// Image right is up × forward.
+    Left,
+}
+
+/// A named material.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Material {
+    /// The name by which spheres refer to it.
+    pub name: String,
+    /// How it scatters light.
+    pub kind: MaterialKind,
+    /// Radiance emitted on both sides of the surface; zero for most materials.
+    pub emission: DVec3,
+}
+
+/// How a surface scatters light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum MaterialKind {
+    /// Lambert's law: BRDF = albedo/π.
+    Diffuse {
+        /// Share of the light that is scattered, in \[0, 1\] per channel.
+        albedo: DVec3,
+    },
+    /// A perfect mirror.
+    Mirror {
+        /// Share of the light that is reflected, in \[0, 1\] per channel.
+        reflectance: DVec3,
+    },
+    /// Smooth glass.
+    Dielectric {
+        /// Absolute refractive index (vacuum 1); positive.
+        ior: f64,
+    },
+    /// The lecture's reflective material: albedo/π plus µ · specular where w·d_r > 1 − ε.
+    Reflective {
+        /// Albedo of the diffuse part, in \[0, 1\] per channel.
+        albedo: DVec3,
+        /// Colour of the lobe, in \[0, 1\] per channel.
+        specular: DVec3,
+        /// Size of the lobe: one minus the cosine of its half-angle, in (0, 1].
+        epsilon: f64,
+        /// Value of the BRDF in the lobe for specular = 1, in 1/sr; not negative.
+        mu: f64,
+    },
+}
+
+/// A sphere.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sphere {
+    /// Its centre.
+    pub center: DVec3,
+    /// Its radius; positive.
+    pub radius: f64,
+    /// Index into [`Scene::materials`].
+    pub material: usize,
+    /// Which dielectric fills the space where several overlap: the highest wins. `None`: smaller
+    /// spheres win over larger ones. Only dielectric spheres may have one.
+    pub priority: Option<i32>,
+}

@@ -1,0 +1,303 @@
+//! From a file whose shape is right to a [`Scene`]: what concerns several values at once.
+
+use std::collections::{BTreeSet, HashMap};
+use std::f64::consts::PI;
+use std::ops::Range;
+
+use glam::DVec3;
+
+use super::file::{CameraTable, HandednessName, MaterialTable, SceneFile};
+use super::report::{Problem, Report};
+use super::suggest::{list, nearest};
+use super::{Camera, Handedness, Material, MaterialKind, RenderDefaults, Scene, Sphere};
+
+/// Directions whose angle has a smaller sine are parallel: of the sixteen digits of an f64 the
+/// cross product keeps half, which is what the f32 of the GPU needs.
+const PARALLEL: f64 = 1e-8;
+
+/// A material may reflect this much more than everything without a warning: the lecture's ε = 0.01,
+/// µ = 10 with albedo 0.375 reflects 1.00018 and counts as energy-conserving.
+const ENERGY_SLACK: f64 = 5e-4;
+
+/// At most so many material names are listed in a message.
+const NAMES_LISTED: usize = 12;
+
+/// The scene of a file; `None` after errors, which the report then holds.
+pub(super) fn scene(file: SceneFile, report: &mut Report) -> Option<Scene> {
+    let camera = camera(&file.camera, report);
+    let mut materials: Vec<_> = file
+        .material
+        .into_iter()
+        .map(|(name, table)| {
+            let span = name.span();
+            (span, material(name.into_inner(), &table))
+        })
+        .collect();
+    // The map is ordered by name; the order of the file is what people expect to see.
+    materials.sort_by_key(|(span, _)| span.start);
+    let (spans, materials): (Vec<_>, Vec<_>) = materials.into_iter().unzip();
+
+    let names: HashMap<&str, usize> = materials
+        .iter()
+        .enumerate()
+        .map(|(index, material)| (material.name.as_str(), index))
+        .collect();
+    let mut spheres = Vec::with_capacity(file.sphere.len());
+    let mut used = BTreeSet::new();
+    for sphere in &file.sphere {
+        let Some(&index) = names.get(sphere.material.get_ref().as_str()) else {
+            let problem = unknown_material(sphere.material.get_ref(), &materials);
+            report.errors.push(Problem {
+                span: sphere.material.span(),
+                ..problem
+            });
+            continue;
+        };
+        used.insert(index);
+        let dielectric = matches!(materials[index].kind, MaterialKind::Dielectric { .. });
+        if let Some(priority) = sphere.priority.as_ref().filter(|_| !dielectric) {
+            let message = format!(
+                "`priority` needs a dielectric, and `{}` is none",
+                materials[index].name
+            );
+            let problem = Problem::new(priority.span(), message, "")
+                .also(
+                    sphere.material.span(),
+                    format!("a {} material", materials[index].kind.name()),
+                )
+                .help("remove `priority`: it decides which dielectric fills an overlap");
+            report.errors.push(problem);
+        }
+        spheres.push(Sphere {
+            center: vector(sphere.center),
+            radius: sphere.radius,
+            material: index,
+            priority: sphere.priority.as_ref().map(|priority| *priority.get_ref()),
+        });
+    }
+
+    let scene = Scene {
+        camera: camera?,
+        width: file.image.width,
+        height: file.image.height,
+        render: RenderDefaults {
+            spp: file.render.spp,
+            max_bounces: file.render.max_bounces,
+        },
+        environment: file
+            .environment
+            .map(|environment| vector(environment.radiance))
+            .filter(|radiance| *radiance != DVec3::ZERO),
+        materials,
+        spheres,
+    };
+    if !report.errors.is_empty() {
+        return None;
+    }
+    warn(&scene, &spans, &used, report);
+    Some(scene)
+}
+
+fn camera(table: &CameraTable, report: &mut Report) -> Option<Camera> {
+    let position = vector(*table.position.get_ref());
+    let look_at = vector(*table.look_at.get_ref());
+    let up = table
+        .up
+        .as_ref()
+        .map_or(DVec3::Y, |up| vector(*up.get_ref()));
+    let errors = report.errors.len();
+    match direction(look_at - position) {
+        None => {
+            let problem = Problem::new(
+                table.look_at.span(),
+                "`look_at` is the camera's `position`: no direction to look in",
+                "",
+            );
+            report
+                .errors
+                .push(problem.also(table.position.span(), "the same point"));
+        }
+        Some(forward) => {
+            let sine = direction(up).map(|up| up.cross(forward).length());
+            // Without the key the default is at fault, and what it collides with is shown.
+            let span = table
+                .up
+                .as_ref()
+                .map_or_else(|| table.look_at.span(), |up| up.span());
+            let default = if table.up.is_none() {
+                ", (0, 1, 0) by default,"
+            } else {
+                ""
+            };
+            if sine.is_none() {
+                let problem = Problem::new(span, "`up` has no direction: its length is 0", "");
+                report
+                    .errors
+                    .push(problem.help("`up = [0.0, 1.0, 0.0]` is the default"));
+            } else if sine < Some(PARALLEL) {
+                let other = if forward.y.abs() < 0.9 {
+                    "[0.0, 1.0, 0.0]"
+                } else {
+                    "[0.0, 0.0, 1.0]"
+                };
+                let message = format!("`up`{default} is parallel to the camera's view axis");
+                report.errors.push(
+                    Problem::new(span, message, "")
+                        .help(format!("set another upward direction: `up = {other}`")),
+                );
+            }
+        }
+    }
+    let aperture = table
+        .aperture_radius
+        .as_ref()
+        .map_or(0.0, |radius| *radius.get_ref());
+    if let Some(radius) = table.aperture_radius.as_ref().filter(|_| aperture > 0.0)
+        && table.focus_distance.is_none()
+    {
+        let message = "`focus_distance` is missing: a lens needs it";
+        let distance = (look_at - position).length();
+        let problem = Problem::new(radius.span(), message, "the lens is asked for here");
+        report.errors.push(problem.help(match distance {
+            0.0 => "`aperture_radius = 0.0` is a pinhole".to_owned(),
+            _ => format!(
+                "`focus_distance = {distance:?}` focuses on `look_at`; \
+                 `aperture_radius = 0.0` is a pinhole"
+            ),
+        }));
+    }
+    (report.errors.len() == errors).then(|| Camera {
+        position,
+        look_at,
+        up,
+        fov: table.fov,
+        handedness: match table.handedness {
+            HandednessName::Right => Handedness::Right,
+            HandednessName::Left => Handedness::Left,
+        },
+        aperture_radius: aperture + 0.0,
+        focus_distance: table
+            .focus_distance
+            .unwrap_or_else(|| (look_at - position).length()),
+    })
+}
+
+/// The vector's direction; `None` if it has none. Lengths whose square is no f64 are fine.
+fn direction(vector: DVec3) -> Option<DVec3> {
+    let largest = vector.abs().max_element();
+    (largest > 0.0).then(|| (vector / largest).normalize())
+}
+
+/// The vector, without negative zeros: the two zeros are equal and must hash alike.
+fn vector(values: [f64; 3]) -> DVec3 {
+    DVec3::from_array(values) + 0.0
+}
+
+fn material(name: String, table: &MaterialTable) -> Material {
+    let (kind, emission) = match *table {
+        MaterialTable::Diffuse { albedo, emission } => {
+            let albedo = vector(albedo);
+            (MaterialKind::Diffuse { albedo }, emission)
+        }
+        MaterialTable::Mirror {
+            reflectance,
+            emission,
+        } => {
+            let reflectance = vector(reflectance);
+            (MaterialKind::Mirror { reflectance }, emission)
+        }
+        MaterialTable::Dielectric { ior, emission } => (MaterialKind::Dielectric { ior }, emission),
+        MaterialTable::Reflective {
+            albedo,
+            specular,
+            epsilon,
+            mu,
+            emission,
+        } => {
+            let (albedo, specular) = (vector(albedo), vector(specular));
+            let mu = mu + 0.0;
+            (
+                MaterialKind::Reflective {
+                    albedo,
+                    specular,
+                    epsilon,
+                    mu,
+                },
+                emission,
+            )
+        }
+    };
+    Material {
+        name,
+        kind,
+        emission: vector(emission),
+    }
+}
+
+fn unknown_material(name: &str, materials: &[Material]) -> Problem {
+    let names = || materials.iter().map(|material| material.name.as_str());
+    let label =
+        nearest(name, names()).map_or_else(String::new, |near| format!("did you mean \"{near}\"?"));
+    let message = format!("unknown material \"{}\"", name.escape_debug());
+    let more = materials.len().saturating_sub(NAMES_LISTED);
+    let help = match (materials.len(), more) {
+        (0, _) => format!("no material is defined; add a table `[material.{name}]`"),
+        (1, _) => format!("the only material here is {}", list(names(), "")),
+        (_, 0) => format!("the materials here are {}", list(names(), "and")),
+        _ => format!(
+            "the materials here are {} and {more} more",
+            names().take(NAMES_LISTED).collect::<Vec<_>>().join(", ")
+        ),
+    };
+    Problem::new(0..0, message, label).help(help)
+}
+
+fn warn(scene: &Scene, spans: &[Range<usize>], used: &BTreeSet<usize>, report: &mut Report) {
+    let warnings = &mut report.warnings;
+    let lit = |index: &usize| scene.materials[*index].emission != DVec3::ZERO;
+    if scene.environment.is_none() && !used.iter().any(lit) {
+        let problem = Problem::new(0..0, "the scene has no light: the image will be black", "");
+        warnings.push(problem.help(
+            "give a sphere's material an `emission`, or add `[environment]` with a `radiance`",
+        ));
+    }
+    if scene.spheres.is_empty() {
+        let problem = Problem::new(
+            0..0,
+            "the scene has no spheres: only the environment is seen",
+            "",
+        );
+        warnings.push(
+            problem.help("spheres are tables `[[sphere]]` with `center`, `radius` and `material`"),
+        );
+    }
+    for (index, (material, span)) in scene.materials.iter().zip(spans).enumerate() {
+        if !used.contains(&index) {
+            let message = format!(
+                "material \"{}\" is used by no sphere",
+                material.name.escape_debug()
+            );
+            warnings.push(Problem::new(span.clone(), message, ""));
+        }
+        if let MaterialKind::Reflective {
+            albedo,
+            specular,
+            epsilon,
+            mu,
+        } = material.kind
+        {
+            let lobe = mu * PI * (2.0 * epsilon - epsilon * epsilon);
+            let total = (albedo + lobe * specular).max_element();
+            if total > 1.0 + ENERGY_SLACK {
+                let message = format!(
+                    "material \"{}\" gains energy: it reflects up to {total:.3} times the light",
+                    material.name.escape_debug()
+                );
+                warnings.push(Problem::new(span.clone(), message, "").help(format!(
+                    "albedo + {lobe:.3} specular must be at most 1 in each channel, \
+                     where {lobe:.3} = mu pi (2 epsilon - epsilon^2)"
+                )));
+            }
+        }
+    }
+}

@@ -1,0 +1,142 @@
+//! What will be rendered: options after validation, with every default decided.
+
+use std::time::Duration;
+
+use crate::scene::Scene;
+
+/// Samples a pixel where neither the command line nor the scene says.
+pub const DEFAULT_SPP: u64 = 256;
+/// The cap where only an error or a time is asked for.
+pub const MAXIMUM_SPP: u64 = 1 << 20;
+/// Scattering events of a path where neither the command line nor the scene says.
+pub const DEFAULT_MAX_BOUNCES: u32 = 64;
+/// The lecture's probability of termination.
+pub const DEFAULT_TERMINATION: f64 = 0.2;
+
+/// Everything that decides an image besides the scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    /// Width of the whole image, in pixels.
+    pub width: u32,
+    /// Height of the whole image, in pixels.
+    pub height: u32,
+    /// The part of the image that is rendered.
+    pub crop: Rect,
+    /// Sample indices to render, first and one past the last.
+    pub samples: std::ops::Range<u64>,
+    /// Seed of the sample stream.
+    pub seed: u64,
+    /// The largest number of scattering events of a path.
+    pub max_bounces: u32,
+    /// The estimator.
+    pub integrator: Integrator,
+    /// Whether paths end by Russian roulette on their throughput (`bsdf` only).
+    pub roulette: bool,
+    /// The form of the geometry in the kernel.
+    pub geometry: GeometryChoice,
+    /// Stop when the estimated error is at most this.
+    pub error: Option<f64>,
+    /// Stop when rendering has taken this long.
+    pub time: Option<Duration>,
+}
+
+impl Settings {
+    /// The defaults for `scene`.
+    #[must_use]
+    pub fn for_scene(scene: &Scene) -> Self {
+        Self {
+            width: scene.width,
+            height: scene.height,
+            crop: Rect { x: 0, y: 0, width: scene.width, height: scene.height },
+            samples: 0..scene.render.spp.unwrap_or(DEFAULT_SPP),
+            seed: 0,
+            max_bounces: scene.render.max_bounces.unwrap_or(DEFAULT_MAX_BOUNCES),
+            integrator: Integrator::Bsdf,
+            roulette: true,
+            geometry: GeometryChoice::Auto,
+            error: None,
+            time: None,
+        }
+    }
+}
+
+/// A rectangle of pixels; (0, 0) is the top left of the image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Rect {
+    /// Leftmost column.
+    pub x: u32,
+    /// Topmost row.
+    pub y: u32,
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+}
+
+impl Rect {
+    /// The number of pixels.
+    #[must_use]
+    pub fn pixels(&self) -> usize {
+        self.width as usize * self.height as usize
+    }
+
+    /// The rectangle cut into pieces of at most `side` x `side`, by rows.
+    pub fn pieces(self, side: u32) -> impl Iterator<Item = Self> {
+        let step = side as usize;
+        (0..self.height).step_by(step).flat_map(move |dy| {
+            (0..self.width).step_by(step).map(move |dx| Self {
+                x: self.x + dx,
+                y: self.y + dy,
+                width: side.min(self.width - dx),
+                height: side.min(self.height - dy),
+            })
+        })
+    }
+}
+
+/// How light transport is estimated.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Integrator {
+    /// The lecture's estimator: uniform hemisphere, constant probability of termination.
+    Lecture {
+        /// Probability that a path ends at a vertex.
+        termination: f64,
+    },
+    /// BSDF sampling with roulette on the throughput.
+    Bsdf,
+}
+
+impl Integrator {
+    /// The name on the command line.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Lecture { .. } => "lecture",
+            Self::Bsdf => "bsdf",
+        }
+    }
+}
+
+/// The form of the geometry in the kernel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum GeometryChoice {
+    /// By the number of spheres.
+    Auto,
+    /// Spheres as constants in the kernel.
+    Baked,
+    /// A loop over storage buffers.
+    List,
+}
+
+/// The two words that stand for the seed and the high word of the sample index in the sample
+/// stream (`shaders/core/random.wesl`).
+#[must_use]
+pub fn stream_words(seed: u64, sample_high: u32) -> [u32; 2] {
+    let v = crate::reference::core::random::pcg4d([
+        seed as u32,
+        (seed >> 32) as u32,
+        sample_high,
+        0x5eed,
+    ]);
+    [v[0], v[1]]
+}

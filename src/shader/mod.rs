@@ -1,0 +1,134 @@
+//! The kernel: linked from `shaders/` for exactly the effects in use, and validated by naga.
+//!
+//! The only module that knows WESL.
+
+mod baked;
+mod sources;
+
+use wesl::{ManglerKind, ModulePath, VirtualResolver, Wesl};
+
+use crate::effects::Effects;
+use crate::error::{Error, Result};
+use crate::placement::Placement;
+use crate::scene::Scene;
+
+/// A linked and validated kernel.
+#[derive(Debug)]
+pub struct Kernel {
+    /// Plain WGSL.
+    pub wgsl: String,
+    /// The same as naga understands it, for reflection.
+    pub module: naga::Module,
+}
+
+impl Kernel {
+    /// Whether the kernel has a resource at `binding` of group 0.
+    #[must_use]
+    pub fn has_binding(&self, binding: u32) -> bool {
+        self.module.global_variables.iter().any(|(_, variable)| {
+            variable.binding.is_some_and(|b| b.group == 0 && b.binding == binding)
+        })
+    }
+
+    /// Name, offset and size in bytes of every member of the struct type `name` (as the linker
+    /// named it: the end of the name is enough), and the struct's own size.
+    #[must_use]
+    pub fn struct_members(&self, name: &str) -> Option<(Vec<(String, u32)>, u32)> {
+        self.module.types.iter().find_map(|(_, ty)| match (&ty.name, &ty.inner) {
+            (Some(n), naga::TypeInner::Struct { members, span })
+                if n == name || n.ends_with(&format!("_{name}")) =>
+            {
+                let members = members
+                    .iter()
+                    .map(|m| (m.name.clone().unwrap_or_default(), m.offset))
+                    .collect();
+                Some((members, *span))
+            }
+            _ => None,
+        })
+    }
+}
+
+/// Which entry point to link.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stage {
+    /// The path tracer (`shaders/path.wesl`).
+    Path,
+    /// Single functions, for tests (`shaders/probe.wesl`).
+    Probe,
+}
+
+/// Links the kernel of `stage` for `scene` with exactly `effects`.
+///
+/// # Errors
+/// [`Error::Shader`] if the sources do not link or the result is not valid WGSL.
+pub fn link(
+    stage: Stage,
+    scene: &Scene,
+    placement: &Placement,
+    effects: &Effects,
+) -> Result<Kernel> {
+    let mut resolver = VirtualResolver::new();
+    for (path, text) in sources::ALL {
+        resolver.add_module(module_path(path), (*text).into());
+    }
+    resolver.add_module(module_path("config"), config(scene, placement, effects).into());
+    if effects.has("baked") {
+        let text = baked::geometry(scene, placement, effects);
+        resolver.add_module(module_path("scene/baked"), text.into());
+    }
+    let mut compiler = Wesl::new_barebones().set_custom_resolver(resolver);
+    compiler
+        .use_imports(true)
+        .use_condcomp(true)
+        .use_stripping(true)
+        .set_mangler(ManglerKind::Escape)
+        .set_missing_feature_behavior(wesl::Feature::Error);
+    for (name, used) in effects.flags() {
+        compiler.set_feature(name, used);
+    }
+    let root = match stage {
+        Stage::Path => "path",
+        Stage::Probe => "probe",
+    };
+    let wgsl = compiler
+        .compile(&module_path(root))
+        .map_err(|e| Error::Shader(format!("the kernel does not link: {e}")))?
+        .to_string();
+    let module = validate(&wgsl)?;
+    Ok(Kernel { wgsl, module })
+}
+
+/// Parses and validates WGSL with naga.
+///
+/// # Errors
+/// [`Error::Shader`] with the place in the source.
+pub fn validate(wgsl: &str) -> Result<naga::Module> {
+    let module = naga::front::wgsl::parse_str(wgsl)
+        .map_err(|e| Error::Shader(format!("the kernel is not WGSL: {}", e.emit_to_string(wgsl))))?;
+    naga::valid::Validator::new(
+        naga::valid::ValidationFlags::all(),
+        naga::valid::Capabilities::empty(),
+    )
+    .validate(&module)
+    .map_err(|e| Error::Shader(format!("the kernel is not valid: {}", e.emit_to_string(wgsl))))?;
+    Ok(module)
+}
+
+fn module_path(path: &str) -> ModulePath {
+    format!("package::{}", path.replace('/', "::")).parse().expect("a literal path of this crate")
+}
+
+/// The module `config`: sizes and constants of this scene.
+fn config(scene: &Scene, placement: &Placement, effects: &Effects) -> String {
+    let mut text = format!(
+        "const SPHERE_COUNT: u32 = {}u;\nconst POLE_COUNT: u32 = {}u;\n",
+        placement.spheres.len(),
+        placement.poles,
+    );
+    if effects.has("environment") {
+        let radiance = scene.environment.unwrap_or_default();
+        text += &format!("const ENVIRONMENT: vec3f = {};\n", baked::vector(radiance));
+    }
+    text
+}

@@ -1,0 +1,29 @@
+//! The kernel's sources, embedded.
+
+macro_rules! sources {
+    ($($path:literal),* $(,)?) => {
+        /// Path below `shaders/` without extension, and text.
+        pub(super) const ALL: &[(&str, &str)] = &[
+            $(($path, include_str!(concat!("../../shaders/", $path, ".wesl")))),*
+        ];
+    };
+}
+
+sources![
+    "path",
+    "core/random",
+    "core/sampling",
+    "core/sum",
+    "scene/ray",
+    "scene/sphere",
+    "scene/list",
+    "scene/material",
+    "scene/camera",
+    "bsdf/sample",
+    "bsdf/scatter",
+    "bsdf/diffuse",
+    "bsdf/mirror",
+    "bsdf/dielectric",
+    "bsdf/reflective",
+    "light/environment",
+];

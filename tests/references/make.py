@@ -1,0 +1,256 @@
+#!/usr/bin/env python3
+"""Independent reference images, with their variance, rendered by Mitsuba 3.
+
+Usage, in this folder:
+
+    pip install mitsuba numpy
+    python3 make.py                      # every scene here
+    python3 make.py glass --batches 512  # one scene, more samples
+    python3 make.py --summary            # accuracy of the images that are there
+
+For each scene `NAME.toml` (the scene format of gpu-trace, as far as Mitsuba can render it) this
+writes
+
+    NAME.mean.npy      float32, (height, width, 3), rows from the top: linear RGB radiance
+    NAME.variance.npy  the same shape: variance *of that mean*, from independent batches
+
+and an entry in `references.json` (versions, samples, seed, SHA-256 of the scene file, accuracy).
+The standard error of a pixel is sqrt(variance). It is estimated from B batches, so it is itself
+uncertain by 1/sqrt(2 (B - 1)) of its value. The images in the repository were made with Mitsuba
+3.9.1 (Dr.Jit 1.5.0, LLVM 19); `references.json` says what applies to each.
+
+What had to be matched, all of it cross-checked against a double-precision tracer that shares no
+code with Mitsuba:
+
+- Camera. Mitsuba's `look_at` gives image right = forward x up, our "right"; for "left" the image
+  is mirrored after rendering. Our angle of view is the full vertical one: `fov_axis = "y"`.
+  The plane in focus is perpendicular to the view axis in both.
+- Pixel filter: box, one pixel wide, so pixels are independent of each other.
+- `max_bounces` scattering events are `max_depth = max_bounces + 1` path edges. Roulette is off.
+- Emission. Ours radiates on both sides of a surface, Mitsuba's `area` only outwards. Therefore no
+  scene here has a camera or a visible surface inside an emitter.
+- Dielectrics: `ext_ior` is 1 (Mitsuba's default is air, 1.000277). Radiance is scaled by the
+  square of the relative index on refraction in both.
+- Mitsuba is single precision: it is trusted here only because every sphere is small (radius 20
+  at most, and near the camera). Do not add scenes with huge walls.
+
+The integrator is `path`: it samples lights and combines with multiple importance sampling, which
+changes the noise and not the expected value.
+"""
+
+import argparse
+import hashlib
+import json
+import math
+import os
+import pathlib
+import sys
+import tomllib
+
+import numpy as np
+
+HERE = pathlib.Path(__file__).resolve().parent
+NO_ROULETTE = 1_000_000  # rr_depth: roulette would begin after this many bounces
+
+
+def choose_variant(mi, wanted):
+    """Select `wanted`, or else the first variant that works: LLVM is faster than scalar."""
+    if wanted is None and not os.environ.get("DRJIT_LIBLLVM_PATH"):
+        # Debian's libllvm19. LLVM 15 and 16 abort on recent CPUs, so a version is named.
+        for path in sorted(pathlib.Path("/usr/lib").glob("*/libLLVM.so.19*")):
+            os.environ["DRJIT_LIBLLVM_PATH"] = str(path)
+            break
+    if wanted is None:
+        wanted = "llvm_ad_rgb" if os.environ.get("DRJIT_LIBLLVM_PATH") else "scalar_rgb"
+    mi.set_variant(wanted)
+    return wanted
+
+
+def material_to_bsdf(material, name):
+    """Mitsuba's BSDF for one `[material.NAME]` table."""
+    kind = material["type"]
+    if kind == "diffuse":
+        return {"type": "diffuse", "reflectance": {"type": "rgb", "value": material["albedo"]}}
+    if kind == "mirror":
+        return {
+            "type": "conductor",
+            "material": "none",  # reflects everything
+            "specular_reflectance": {"type": "rgb", "value": material["reflectance"]},
+        }
+    if kind == "dielectric":
+        return {"type": "dielectric", "int_ior": float(material["ior"]), "ext_ior": 1.0}
+    sys.exit(f"material {name}: Mitsuba has no equivalent of type {kind!r}")
+
+
+def scene_to_mitsuba(mi, description, spp):
+    """Mitsuba's scene dictionary for a parsed scene file."""
+    camera = description["camera"]
+    image = description["image"]
+    lens = camera.get("aperture_radius", 0.0)
+    sensor = {
+        "type": "thinlens" if lens > 0.0 else "perspective",
+        "to_world": mi.ScalarTransform4f().look_at(
+            origin=camera["position"],
+            target=camera["look_at"],
+            up=camera.get("up", [0.0, 1.0, 0.0]),
+        ),
+        "fov": float(camera["fov"]),
+        "fov_axis": "y",
+        "near_clip": 1e-2,
+        "far_clip": 1e4,
+        "film": {
+            "type": "hdrfilm",
+            "width": image["width"],
+            "height": image["height"],
+            "pixel_format": "rgb",
+            "component_format": "float32",
+            "rfilter": {"type": "box"},
+            "sample_border": False,
+        },
+        "sampler": {"type": "independent", "sample_count": spp},
+    }
+    if lens > 0.0:
+        sensor["aperture_radius"] = float(lens)
+        sensor["focus_distance"] = float(camera["focus_distance"])
+
+    max_bounces = description.get("render", {}).get("max_bounces", 64)
+    scene = {
+        "type": "scene",
+        "integrator": {
+            "type": "path",
+            "max_depth": max_bounces + 1,
+            "rr_depth": NO_ROULETTE,
+            "hide_emitters": False,
+        },
+        "sensor": sensor,
+    }
+    if "environment" in description:
+        radiance = description["environment"]["radiance"]
+        scene["environment"] = {"type": "constant", "radiance": {"type": "rgb", "value": radiance}}
+    for index, sphere in enumerate(description["sphere"]):
+        name = sphere["material"]
+        material = description["material"][name]
+        shape = {
+            "type": "sphere",
+            "center": sphere["center"],
+            "radius": float(sphere["radius"]),
+            "bsdf": material_to_bsdf(material, name),
+        }
+        emission = material.get("emission", [0.0, 0.0, 0.0])
+        if any(emission):
+            if material["type"] == "dielectric":
+                sys.exit(f"material {name}: Mitsuba cannot emit into a dielectric sphere")
+            shape["emitter"] = {"type": "area", "radiance": {"type": "rgb", "value": emission}}
+        scene[f"sphere_{index}"] = shape
+    return scene
+
+
+def render(mi, description, spp, batches, seed):
+    """Mean image and variance of that mean from `batches` independent renders of `spp` samples.
+
+    Returns two float64 arrays (height, width, 3). Batch i is rendered with Mitsuba's seed
+    `seed + i`; the batches are combined by Welford's update in double precision. Batches are kept
+    small because Mitsuba sums samples in single precision: at 1024 samples that alone is off by
+    1e-5 of the value, the same way every time; at 128 by 1e-6.
+    """
+    scene = mi.load_dict(scene_to_mitsuba(mi, description, spp))
+    mirrored = description["camera"].get("handedness", "right") == "left"
+    mean = None
+    squares = None  # sum of squared deviations from the running mean
+    for batch in range(batches):
+        image = np.array(mi.render(scene, seed=seed + batch, spp=spp), dtype=np.float64)
+        if not np.isfinite(image).all():
+            sys.exit(f"batch {batch}: non-finite pixels")
+        if mirrored:
+            image = image[:, ::-1]
+        if mean is None:
+            mean, squares = np.zeros_like(image), np.zeros_like(image)
+        deviation = image - mean
+        mean += deviation / (batch + 1)
+        squares += deviation * (image - mean)
+        if sys.stderr.isatty():
+            print(f"\r  batch {batch + 1}/{batches}", end="", file=sys.stderr)
+    if sys.stderr.isatty():
+        print("\r\x1b[K", end="", file=sys.stderr)
+    return mean, squares / (batches - 1) / batches
+
+
+def accuracy(mean, variance):
+    """Numbers that say how good a reference is; the relative ones per pixel and channel."""
+    mean, variance = mean.astype(np.float64), variance.astype(np.float64)
+    relative = np.sqrt(variance) / mean
+    floor = (0.1 * mean.mean()) ** 2
+    return {
+        "mean": [float(f"{x:.6g}") for x in mean.mean(axis=(0, 1))],
+        "mean_standard_error": [
+            float(f"{x:.3g}") for x in np.sqrt(variance.sum(axis=(0, 1))) / (mean[..., 0].size)
+        ],
+        "relative_standard_error_median": float(f"{np.median(relative):.3g}"),
+        "relative_standard_error_95_percent": float(f"{np.quantile(relative, 0.95):.3g}"),
+        "relative_standard_error_maximum": float(f"{relative.max():.3g}"),
+        "share_within_0.3_percent": float(f"{(relative <= 0.003).mean():.4g}"),
+        # The error measure of gpu-trace, as a fraction.
+        "relative_error": float(f"{math.sqrt((variance / (mean**2 + floor)).mean()):.3g}"),
+    }
+
+
+def main():
+    """Render what the command line names."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("names", nargs="*", help="scenes; default: every NAME.toml here")
+    parser.add_argument("--spp", type=int, default=128, help="samples a pixel in one batch")
+    parser.add_argument("--batches", type=int, default=1024, help="independent batches, >= 64")
+    parser.add_argument("--seed", type=int, default=1, help="seed of the first batch")
+    parser.add_argument("--variant", help="Mitsuba variant (default: llvm_ad_rgb where it works)")
+    parser.add_argument("--threads", type=int, default=0, help="0: all cores")
+    parser.add_argument("--output", type=pathlib.Path, default=HERE, help="folder to write to")
+    parser.add_argument("--summary", action="store_true", help="only print what is there")
+    options = parser.parse_args()
+    if options.batches < 64:
+        parser.error("the variance needs at least 64 batches")
+    names = options.names or sorted(path.stem for path in HERE.glob("*.toml"))
+
+    if options.summary:
+        for name in names:
+            mean = np.load(options.output / f"{name}.mean.npy")
+            variance = np.load(options.output / f"{name}.variance.npy")
+            print(name, json.dumps(accuracy(mean, variance)))
+        return
+
+    import mitsuba as mi
+
+    variant = choose_variant(mi, options.variant)
+    import drjit as dr  # needs the path of LLVM, so only now
+
+    if options.threads and variant.startswith("llvm"):
+        dr.set_thread_count(options.threads)
+
+    record_path = options.output / "references.json"
+    record = json.loads(record_path.read_text()) if record_path.exists() else {}
+    for name in names:
+        source = (HERE / f"{name}.toml").read_bytes()
+        description = tomllib.loads(source.decode())
+        mean, variance = render(mi, description, options.spp, options.batches, options.seed)
+        mean, variance = mean.astype(np.float32), variance.astype(np.float32)
+        np.save(options.output / f"{name}.mean.npy", mean)
+        np.save(options.output / f"{name}.variance.npy", variance)
+        record[name] = {
+            "scene_sha256": hashlib.sha256(source).hexdigest(),
+            "mitsuba": mi.__version__,
+            "drjit": dr.__version__,
+            "variant": variant,
+            "integrator": "path",
+            "max_depth": description.get("render", {}).get("max_bounces", 64) + 1,
+            "roulette": False,
+            "spp_per_batch": options.spp,
+            "batches": options.batches,
+            "spp": options.spp * options.batches,
+            "seed": options.seed,
+            **accuracy(mean, variance),
+        }
+        record_path.write_text(json.dumps(dict(sorted(record.items())), indent=2) + "\n")
+        print(name, json.dumps(record[name]), flush=True)
+
+
+if __name__ == "__main__":
+    main()
