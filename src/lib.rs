@@ -1,12 +1,33 @@
-//! gpu-trace.
-pub mod error;
-pub mod scene;
+//! A headless path tracer for scenes made of spheres, on the GPU through wgpu.
+//!
+//! Data flows one way; the modules stand in its order, and none decides again what an earlier one
+//! decided:
+//!
+//! 1. [`cli`]: what was typed.
+//! 2. [`settings`]: what will be rendered, validated.
+//! 3. [`scene`]: the scene file, validated.
+//! 4. [`placement`]: where everything is, in f64, relative to where the picture is.
+//! 5. [`effects`]: what the scene asks for; nothing else goes into the kernel.
+//! 6. [`shader`]: the kernel, linked for these effects from `shaders/`.
+//! 7. [`gpu`] and [`reference`](mod@reference): two renderers, wgpu in f32 and the CPU in f64, that
+//!    trace the same paths.
+//! 8. [`render`]: the loop that asks a renderer for windows of samples until a stop rule holds.
+//! 9. [`film`]: f64 sums and variances over all windows.
+//! 10. [`estimate`]: mean and error.
+//! 11. [`output`]: images, statistics, progress.
+//!
+//! [`error`] is what can go wrong anywhere.
+
+pub mod cli;
 pub mod settings;
+pub mod scene;
 pub mod placement;
 pub mod effects;
 pub mod shader;
+pub mod gpu;
+pub mod reference;
 pub mod render;
 pub mod film;
 pub mod estimate;
-pub mod gpu;
-pub mod reference;
+pub mod output;
+pub mod error;

@@ -7,6 +7,7 @@ use crate::error::Result;
 use crate::estimate::Estimate;
 use crate::film::{Film, Window, window_end};
 use crate::settings::Settings;
+pub use crate::output::stats::StoppedBy;
 
 /// Renders windows of samples: the GPU or the CPU reference. What comes after does not know which.
 pub trait Renderer {
@@ -25,32 +26,6 @@ pub trait Renderer {
 pub trait Control {
     /// Takes note that `paths` more paths are done; says whether to go on.
     fn proceed(&mut self, paths: u64) -> bool;
-}
-
-/// Why a render ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum StoppedBy {
-    /// All samples are done.
-    Spp,
-    /// The estimated error is small enough.
-    Error,
-    /// The time is up.
-    Time,
-    /// A signal.
-    Interrupt,
-}
-
-impl StoppedBy {
-    /// The name in the statistics.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Spp => "spp",
-            Self::Error => "error",
-            Self::Time => "time",
-            Self::Interrupt => "interrupt",
-        }
-    }
 }
 
 /// Where a render is, for a progress display.

@@ -23,8 +23,8 @@ pub struct AdapterSummary {
     pub unusable: Option<String>,
 }
 
-/// An open device.
-#[derive(Debug)]
+/// An open device. Clones are handles to the same device.
+#[derive(Clone, Debug)]
 pub struct Gpu {
     /// The device.
     pub device: wgpu::Device,
@@ -57,21 +57,42 @@ impl std::str::FromStr for DeviceChoice {
     }
 }
 
-fn instance() -> wgpu::Instance {
+/// The adapters of `backends`, numbered from `first`.
+fn adapters(backends: wgpu::Backends, first: usize) -> Vec<(wgpu::Adapter, AdapterSummary)> {
     // The environment's WGPU_BACKEND is honoured; no display is needed.
-    let descriptor = wgpu::InstanceDescriptor::new_without_display_handle_from_env();
-    wgpu::Instance::new(descriptor)
-}
-
-fn adapters() -> Vec<(wgpu::Adapter, AdapterSummary)> {
-    let all = pollster::block_on(instance().enumerate_adapters(wgpu::Backends::all()));
+    let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle_from_env();
+    descriptor.backends &= backends;
+    let instance = wgpu::Instance::new(descriptor);
+    let all = pollster::block_on(instance.enumerate_adapters(backends));
     all.into_iter()
-        .enumerate()
-        .map(|(index, adapter)| {
+        .zip(first..)
+        .map(|(adapter, index)| {
             let summary = summarize(index, &adapter);
             (adapter, summary)
         })
         .collect()
+}
+
+/// The adapters to choose from. GL comes last, and only if it is needed: asking for it takes time,
+/// and some of its libraries complain on stderr where there is no display.
+fn candidates(choice: Option<&DeviceChoice>) -> Vec<(wgpu::Adapter, AdapterSummary)> {
+    let mut all = adapters(wgpu::Backends::PRIMARY, 0);
+    let enough = match choice {
+        None => false,
+        Some(DeviceChoice::Best) => all.iter().any(|(_, s)| s.unusable.is_none()),
+        Some(DeviceChoice::Index(index)) => *index < all.len(),
+        Some(DeviceChoice::Name(name)) => all.iter().any(|(_, s)| s.is_called(name)),
+    };
+    if !enough {
+        all.extend(adapters(wgpu::Backends::GL, all.len()));
+    }
+    all
+}
+
+impl AdapterSummary {
+    fn is_called(&self, name: &str) -> bool {
+        self.name.to_lowercase().contains(&name.to_lowercase())
+    }
 }
 
 fn summarize(index: usize, adapter: &wgpu::Adapter) -> AdapterSummary {
@@ -123,7 +144,7 @@ fn lacks(adapter: &wgpu::Adapter, limits: &wgpu::Limits) -> Option<String> {
 /// All adapters, in the order in which `--device INDEX` counts them.
 #[must_use]
 pub fn list() -> Vec<AdapterSummary> {
-    adapters().into_iter().map(|(_, summary)| summary).collect()
+    candidates(None).into_iter().map(|(_, summary)| summary).collect()
 }
 
 /// What to do where there is no adapter.
@@ -135,7 +156,7 @@ pub const DRIVER_ADVICE: &str = "to get one without a GPU, install Mesa's lavapi
 /// # Errors
 /// [`Error::Device`] if there is none that fits, or it does not open.
 pub fn open(choice: &DeviceChoice) -> Result<Gpu> {
-    let adapters = adapters();
+    let adapters = candidates(Some(choice));
     let known = || {
         let names: Vec<String> =
             adapters.iter().map(|(_, s)| format!("  {}: {} ({})", s.index, s.name, s.backend)).collect();
@@ -152,7 +173,7 @@ pub fn open(choice: &DeviceChoice) -> Result<Gpu> {
         })?,
         DeviceChoice::Name(name) => adapters
             .iter()
-            .filter(|(_, s)| s.name.to_lowercase().contains(&name.to_lowercase()))
+            .filter(|(_, s)| s.is_called(name))
             .min_by_key(|(_, s)| preference(s))
             .ok_or_else(|| {
                 Error::Device(format!("no device is called '{name}'; the devices are\n{}", known()))

@@ -56,7 +56,8 @@ impl PoleRecord {
     }
 }
 
-/// `Camera` of `shaders/scene/camera.wesl`; see [`PlacedCamera`].
+/// `Camera` of `shaders/scene/camera.wesl`; see [`PlacedCamera`]. Without a lens the kernel's struct
+/// ends before the lens's members.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 #[expect(missing_docs, reason = "the members are those of PlacedCamera")]
@@ -64,17 +65,17 @@ pub struct CameraRecord {
     pub anchor: [f32; 3],
     pub approach: f32,
     pub corner: [f32; 3],
-    pub focus: f32,
-    pub across: [f32; 3],
-    pub lens_share: f32,
-    pub down: [f32; 3],
     pub unused0: f32,
-    pub forward: [f32; 3],
+    pub across: [f32; 3],
     pub unused1: f32,
-    pub lens_across: [f32; 3],
+    pub down: [f32; 3],
     pub unused2: f32,
-    pub lens_down: [f32; 3],
+    pub forward: [f32; 3],
     pub unused3: f32,
+    pub lens_across: [f32; 3],
+    pub focus: f32,
+    pub lens_down: [f32; 3],
+    pub lens_share: f32,
 }
 
 impl CameraRecord {

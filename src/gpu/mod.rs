@@ -2,4 +2,5 @@
 
 pub mod device;
 pub mod layout;
+pub mod probe;
 pub mod renderer;

@@ -110,7 +110,7 @@ impl GpuRenderer {
         });
         let mut constants = vec![("MAX_BOUNCES", f64::from(settings.max_bounces))];
         if let Integrator::Lecture { termination } = settings.integrator {
-            constants.push(("TERMINATION", termination));
+            constants.push(("LECTURE_TERMINATION", termination));
         }
         let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
             label: Some("path"),

@@ -11,6 +11,7 @@ macro_rules! sources {
 
 sources![
     "path",
+    "probe",
     "core/random",
     "core/sampling",
     "core/sum",

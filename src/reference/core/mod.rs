@@ -1,3 +1,4 @@
 //! Twins of `shaders/core/`.
 
 pub mod random;
+pub mod sampling;

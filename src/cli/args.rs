@@ -1,0 +1,239 @@
+//! The options of `render` as they are typed.
+
+use std::ops::Range;
+use std::path::PathBuf;
+use std::time::Duration;
+
+use clap::{Args, ValueEnum};
+
+use super::values;
+use crate::error::{Error, Result};
+use crate::output::ProgressMode;
+use crate::scene::Scene;
+use crate::settings::{
+    DEFAULT_TERMINATION, GeometryChoice, Integrator, MAXIMUM_SPP, Rect, Settings,
+};
+
+/// The options of `render`.
+#[derive(Clone, Debug, Args)]
+#[expect(missing_docs, reason = "the help text says more: it would show here too")]
+pub struct RenderArgs {
+    #[arg(value_name = "SCENE", help = "A scene file, or the name of a built-in scene [default: lecture]")]
+    pub scene: Option<String>,
+
+    #[arg(
+        short, long, value_name = "FILE", help_heading = "Output",
+        help = "Image to write: .png, .exr or .npy; may be repeated [default: SCENE.png]"
+    )]
+    pub output: Vec<PathBuf>,
+    #[arg(long, value_name = "FILE.json", help_heading = "Output", help = "Write statistics as JSON")]
+    pub stats: Option<PathBuf>,
+    #[arg(
+        long, value_name = "EV", value_parser = values::exposure, default_value = "0",
+        allow_hyphen_values = true, hide_default_value = true, help_heading = "Output",
+        help = "Brighten the PNG by a factor of 2^EV"
+    )]
+    pub exposure: f64,
+    #[arg(
+        long, value_name = "FILE", help_heading = "Output",
+        help = "Write the kernel as plain WGSL before rendering"
+    )]
+    pub dump_wgsl: Option<PathBuf>,
+    #[arg(
+        long, value_name = "MODE", value_enum, default_value = "auto", hide_possible_values = true,
+        hide_default_value = true, help_heading = "Output",
+        help = "Progress on stderr: auto (a bar on a terminal), plain, json, none"
+    )]
+    pub progress: ProgressArg,
+    #[arg(short, long, conflicts_with = "verbose", help_heading = "Output", help = "Say nothing but warnings and errors")]
+    pub quiet: bool,
+    #[arg(short, long, help_heading = "Output", help = "Say more: device, effects, times")]
+    pub verbose: bool,
+
+    #[arg(
+        long, value_name = "N", value_parser = values::count, help_heading = "How long",
+        help = "Samples a pixel [default: the scene's, or 256]"
+    )]
+    pub spp: Option<u64>,
+    #[arg(
+        long, value_name = "P", value_parser = values::error, help_heading = "How long",
+        help = "Stop at this estimated error: 1% or 0.01"
+    )]
+    pub error: Option<f64>,
+    #[arg(
+        long, value_name = "TIME", value_parser = values::time, help_heading = "How long",
+        help = "Stop after this time: 30s, 2m, 1h; whichever of --spp, --error and --time comes first"
+    )]
+    pub time: Option<Duration>,
+    #[arg(
+        long, value_name = "A..B", value_parser = values::range, conflicts_with = "spp",
+        help_heading = "How long",
+        help = "Render only the sample indices A up to B - 1: parts average to the whole"
+    )]
+    pub sample_range: Option<Range<u64>>,
+
+    #[arg(
+        long, value_name = "WxH", value_parser = values::size, help_heading = "Image",
+        help = "Size of the image [default: the scene's]"
+    )]
+    pub size: Option<(u32, u32)>,
+    #[arg(
+        long, value_name = "X,Y,WxH", value_parser = values::crop, help_heading = "Image",
+        help = "Render only these pixels of the image"
+    )]
+    pub crop: Option<Rect>,
+    #[arg(
+        long, value_name = "N", default_value = "0", hide_default_value = true,
+        help_heading = "Image", help = "Seed of the random numbers [default: 0]"
+    )]
+    pub seed: u64,
+
+    #[arg(
+        long, value_name = "NAME", value_enum, default_value = "bsdf", hide_possible_values = true,
+        hide_default_value = true, help_heading = "Light transport",
+        help = "Estimator: bsdf (BSDF sampling) or lecture (uniform hemisphere, constant p) [default: bsdf]"
+    )]
+    pub integrator: IntegratorArg,
+    #[arg(
+        long, value_name = "NAME", value_enum, default_value = "independent",
+        hide_possible_values = true, hide_default_value = true, help_heading = "Light transport",
+        help = "Sample placement: independent [default: independent]"
+    )]
+    pub sampler: SamplerArg,
+    #[arg(
+        long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=1_000_000),
+        help_heading = "Light transport",
+        help = "Most scattering events of a path [default: the scene's, or 64]"
+    )]
+    pub max_bounces: Option<u32>,
+    #[arg(
+        long, value_name = "on|off", value_enum, help_heading = "Light transport",
+        hide_possible_values = true,
+        help = "End weak paths early by Russian roulette, without bias [default: on]"
+    )]
+    pub roulette: Option<OnOff>,
+    #[arg(
+        long, value_name = "P", value_parser = values::termination, help_heading = "Light transport",
+        help = "Probability that the lecture's estimator ends at a vertex [default: 0.2]"
+    )]
+    pub termination: Option<f64>,
+
+    #[arg(
+        long, value_name = "NAME", value_enum, default_value = "auto", hide_possible_values = true,
+        hide_default_value = true, help_heading = "Device",
+        help = "What renders: auto, gpu, or cpu (the f64 reference) [default: auto]"
+    )]
+    pub backend: BackendArg,
+    #[arg(
+        long, value_name = "INDEX|NAME", help_heading = "Device",
+        help = "Which adapter, as `gpu-trace devices` lists them"
+    )]
+    pub device: Option<String>,
+    #[arg(
+        long, value_name = "FORM", value_enum, default_value = "auto", hide_possible_values = true,
+        hide_default_value = true, help_heading = "Device",
+        help = "Spheres in the kernel: auto, baked (constants) or list (a buffer) [default: auto]"
+    )]
+    pub geometry: GeometryArg,
+    #[arg(
+        long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024),
+        help_heading = "Device", help = "Threads of the CPU reference [default: one a core]"
+    )]
+    pub threads: Option<u16>,
+}
+
+macro_rules! choices {
+    ($($(#[$doc:meta])* $name:ident { $($variant:ident),* $(,)? })*) => {
+        $(
+            $(#[$doc])*
+            #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+            pub enum $name { $($variant),* }
+        )*
+    };
+}
+
+choices! {
+    /// `--progress`
+    ProgressArg { Auto, Plain, Json, None }
+    /// `--integrator`
+    IntegratorArg { Bsdf, Lecture }
+    /// `--sampler`
+    SamplerArg { Independent }
+    /// `--roulette`
+    OnOff { On, Off }
+    /// `--backend`
+    BackendArg { Auto, Gpu, Cpu }
+    /// `--geometry`
+    GeometryArg { Auto, Baked, List }
+}
+
+impl RenderArgs {
+    /// How progress is shown.
+    #[must_use]
+    pub fn progress_mode(&self) -> ProgressMode {
+        match self.progress {
+            ProgressArg::Auto => ProgressMode::Auto,
+            ProgressArg::Plain => ProgressMode::Plain,
+            ProgressArg::Json => ProgressMode::Json,
+            ProgressArg::None => ProgressMode::None,
+        }
+    }
+
+    /// The settings for `scene`: the command line wins over the scene, the scene over the defaults.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] where options contradict each other or the scene.
+    pub fn settings(&self, scene: &Scene) -> Result<Settings> {
+        let mut settings = Settings::for_scene(scene);
+        if let Some((width, height)) = self.size {
+            (settings.width, settings.height) = (width, height);
+        }
+        let whole = Rect { x: 0, y: 0, width: settings.width, height: settings.height };
+        settings.crop = self.crop.unwrap_or(whole);
+        let crop = &settings.crop;
+        let fits = |at: u32, size: u32, all: u32| u64::from(at) + u64::from(size) <= u64::from(all);
+        if !fits(crop.x, crop.width, whole.width) || !fits(crop.y, crop.height, whole.height) {
+            return Err(Error::Usage(format!(
+                "--crop {},{},{}x{} reaches beyond the image of {}x{} pixels",
+                crop.x, crop.y, crop.width, crop.height, whole.width, whole.height
+            )));
+        }
+        if let Some(spp) = self.spp {
+            settings.samples = 0..spp;
+        } else if self.error.is_some() || self.time.is_some() {
+            // Only what was asked for ends the render, or a cap.
+            settings.samples = 0..MAXIMUM_SPP;
+        }
+        if let Some(range) = &self.sample_range {
+            settings.samples = range.clone();
+        }
+        settings.seed = self.seed;
+        settings.max_bounces = self.max_bounces.unwrap_or(settings.max_bounces);
+        let lecture = self.integrator == IntegratorArg::Lecture;
+        if lecture {
+            let termination = self.termination.unwrap_or(DEFAULT_TERMINATION);
+            settings.integrator = Integrator::Lecture { termination };
+        } else if self.termination.is_some() {
+            return Err(Error::Usage(
+                "--termination is the lecture's: add --integrator lecture".into(),
+            ));
+        }
+        if lecture && self.roulette.is_some() {
+            return Err(Error::Usage(
+                "--integrator lecture has its own roulette: --termination 0 turns it off".into(),
+            ));
+        }
+        settings.roulette = !lecture && self.roulette != Some(OnOff::Off);
+        settings.geometry = match self.geometry {
+            GeometryArg::Auto => GeometryChoice::Auto,
+            GeometryArg::Baked => GeometryChoice::Baked,
+            GeometryArg::List => GeometryChoice::List,
+        };
+        settings.error = self.error;
+        settings.time = self.time;
+        if self.backend == BackendArg::Cpu && self.device.is_some() {
+            return Err(Error::Usage("--device chooses a GPU, --backend cpu uses none".into()));
+        }
+        Ok(settings)
+    }
+}

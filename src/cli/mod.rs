@@ -1,0 +1,144 @@
+//! What was typed. One file a subcommand; each turns its options into what the stages take.
+
+mod args;
+mod devices;
+mod effects;
+mod render;
+mod scene;
+mod shell;
+mod values;
+
+use std::io::Write as _;
+use std::path::PathBuf;
+
+use clap::{Parser, Subcommand};
+
+use crate::error::{Error, Result};
+
+pub use args::RenderArgs;
+
+const AFTER_HELP: &str = "\
+Examples:
+  gpu-trace                                    the built-in lecture scene, to lecture.png
+  gpu-trace glass --spp 1024 -o glass.exr      another scene, linear floats
+  gpu-trace my.toml --error 1% --time 2m       until the error is 1 % or two minutes are over
+  gpu-trace effects my.toml                    what the kernel will hold, and why
+
+Exit codes: 0 done; 1 failed; 2 wrong usage or a bad scene; 130 or 143 ended by a signal, with what
+there was written.";
+
+/// Path-traces scenes made of spheres on a GPU, without a display.
+///
+/// Without a GPU it runs on Mesa's lavapipe, and without that on its own CPU reference.
+#[derive(Debug, Parser)]
+#[command(
+    name = "gpu-trace",
+    version,
+    after_help = AFTER_HELP,
+    args_conflicts_with_subcommands = true,
+    subcommand_precedence_over_arg = true,
+    max_term_width = 100
+)]
+pub struct Cli {
+    #[command(subcommand)]
+    command: Option<Command>,
+    #[command(flatten)]
+    render: RenderArgs,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Render a scene (the same as without a subcommand).
+    Render(Box<RenderArgs>),
+    /// List what the kernel of a scene holds, which object asked for it, and what is left out.
+    Effects {
+        #[command(flatten)]
+        render: Box<RenderArgs>,
+        /// Print JSON.
+        #[arg(long)]
+        json: bool,
+    },
+    /// List the adapters, with driver and limits.
+    Devices {
+        /// Print JSON.
+        #[arg(long)]
+        json: bool,
+    },
+    /// Check a scene file, print the format's JSON schema, or list the built-in scenes.
+    #[command(subcommand)]
+    Scene(SceneCommand),
+    /// Print a shell's completion script.
+    Completions {
+        /// The shell.
+        shell: clap_complete::Shell,
+    },
+    /// Print the manual page.
+    Man,
+}
+
+#[derive(Debug, Subcommand)]
+enum SceneCommand {
+    /// Load a scene, report every mistake in it, and summarise it.
+    Check {
+        /// A scene file or the name of a built-in scene.
+        #[arg(default_value = crate::scene::builtin::DEFAULT)]
+        scene: String,
+    },
+    /// Print the JSON schema of the scene file.
+    Schema,
+    /// List the built-in scenes, or print one as a start for your own.
+    List {
+        /// The built-in scene to print.
+        name: Option<String>,
+    },
+}
+
+/// Runs the program on the process's arguments; returns the exit code.
+#[must_use]
+pub fn main() -> u8 {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => {
+            // Help and version go to stdout and are no error. A closed pipe is none either.
+            let _ = error.print();
+            return u8::try_from(error.exit_code()).unwrap_or(2);
+        }
+    };
+    match run(cli) {
+        Ok(()) => 0,
+        Err(error) => {
+            let text = error.to_string();
+            if !matches!(error, Error::Interrupted(_)) {
+                // Scene errors come with their own heading.
+                let heading = if text.starts_with("error") { "" } else { "error: " };
+                let _ = writeln!(std::io::stderr(), "{heading}{text}");
+            }
+            error.exit_code()
+        }
+    }
+}
+
+fn run(cli: Cli) -> Result<()> {
+    match cli.command {
+        None => render::run(&cli.render),
+        Some(Command::Render(args)) => render::run(&args),
+        Some(Command::Effects { render, json }) => effects::run(&render, json),
+        Some(Command::Devices { json }) => devices::run(json),
+        Some(Command::Scene(SceneCommand::Check { scene })) => scene::check(&scene),
+        Some(Command::Scene(SceneCommand::Schema)) => scene::schema(),
+        Some(Command::Scene(SceneCommand::List { name })) => scene::list(name.as_deref()),
+        Some(Command::Completions { shell }) => shell::completions(shell),
+        Some(Command::Man) => shell::man(),
+    }
+}
+
+/// Prints a result. A reader that has seen enough (`| head`) is no error.
+fn print(text: &str) -> Result<()> {
+    let mut stdout = std::io::stdout().lock();
+    match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
+        Err(source) if source.kind() != std::io::ErrorKind::BrokenPipe => {
+            Err(Error::File { action: "cannot write", path: PathBuf::from("stdout"), source })
+        }
+        _ => Ok(()),
+    }
+}

@@ -1,0 +1,363 @@
+//! `gpu-trace render`: from a scene file to images.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use super::args::{BackendArg, RenderArgs};
+use super::print;
+use crate::effects::Effects;
+use crate::error::{Error, Result};
+use crate::estimate::energy_cut_at_most;
+use crate::gpu::device::{self, DRIVER_ADVICE, DeviceChoice};
+use crate::gpu::renderer::GpuRenderer;
+use crate::output::stats::{BounceLimit, Device, Seconds};
+use crate::output::{
+    Contents, Picture, Progress, Snapshot, Stats, Target, atomic, check_all, write_all,
+};
+use crate::placement::Placement;
+use crate::reference::path::ReferenceRenderer;
+use crate::render::{Outcome, Renderer, Status, StoppedBy, Watch, render};
+use crate::scene::builtin;
+use crate::scene::load::Loaded;
+use crate::settings::{MAXIMUM_SPP, Settings};
+use crate::shader::{Stage, link};
+
+/// Everything about a render that is decided before a device is touched.
+struct Job {
+    loaded: Loaded,
+    settings: Settings,
+    placement: Placement,
+    effects: Effects,
+    targets: Vec<Target>,
+}
+
+/// Runs `render`.
+pub(super) fn run(args: &RenderArgs) -> Result<()> {
+    let begin = Instant::now();
+    let job = prepare(args)?;
+    let signals = Signals::listen()?;
+    let progress = Progress::new(args.progress_mode(), args.quiet);
+    let mut warnings = job.loaded.warnings.clone();
+    if let Some(path) = &args.dump_wgsl {
+        let kernel = link(Stage::Path, &job.loaded.scene, &job.placement, &job.effects)?;
+        write_file(path, kernel.wgsl.as_bytes())?;
+    }
+    let opening = Instant::now();
+    let (mut renderer, backend, compile) = open(args, &job, &progress)?;
+    let setup = begin.elapsed().saturating_sub(compile);
+    let (name, interface, driver) = renderer.device();
+    if args.verbose {
+        progress.message(&format!("device: {name} ({interface}, {driver}), open in {:.2?}", opening.elapsed()));
+        progress.message(&format!("effects: {}", job.effects.names().collect::<Vec<_>>().join(", ")));
+    }
+    for warning in &warnings {
+        progress.warning(warning);
+    }
+
+    let mut watch = Display::new(&progress, &signals, &job.settings);
+    let outcome = render(renderer.as_mut(), &job.settings, &mut watch);
+    progress.finish();
+
+    warnings.extend(observations(&outcome, &job.settings));
+    for warning in &warnings[job.loaded.warnings.len()..] {
+        progress.warning(warning);
+    }
+    let stats = statistics(&job, &outcome, backend, Device { name, backend: interface, driver });
+    let stats = Stats {
+        seconds: Seconds {
+            total: begin.elapsed().as_secs_f64(),
+            setup: setup.as_secs_f64(),
+            compile: compile.as_secs_f64(),
+            render: outcome.elapsed.as_secs_f64(),
+        },
+        warnings,
+        ..stats
+    };
+    finish(args, &job, &outcome, &stats)?;
+    if let Some(failure) = outcome.failure {
+        return Err(failure);
+    }
+    if let Some(first) = outcome.film.tally().first_non_finite {
+        return Err(Error::NonFinite(format!(
+            "{} samples were not finite and are in no sum; the first: pixel ({}, {}), sample {}, \
+             after bounce {}",
+            outcome.film.tally().non_finite, first.pixel[0], first.pixel[1], first.sample, first.bounce
+        )));
+    }
+    signals.code().map_or(Ok(()), |code| Err(Error::Interrupted(code)))
+}
+
+/// Loads and decides everything; checks the outputs. Touches no device and no file.
+fn prepare(args: &RenderArgs) -> Result<Job> {
+    let loaded = builtin::resolve(args.scene.as_deref())?;
+    let settings = args.settings(&loaded.scene)?;
+    let targets = if args.output.is_empty() {
+        vec![Target::parse(format!("{}.png", loaded.name))?]
+    } else {
+        args.output.iter().map(Target::parse).collect::<Result<_>>()?
+    };
+    let mut outputs: Vec<&Path> = targets.iter().map(|t| t.path.as_path()).collect();
+    outputs.extend(args.stats.as_deref());
+    outputs.extend(args.dump_wgsl.as_deref());
+    let scene_file = args.scene.as_deref().map(Path::new).filter(|path| path.is_file());
+    check_all(&outputs, scene_file.as_slice())?;
+    let placement = Placement::new(&loaded.scene, settings.width, settings.height);
+    let effects = Effects::derive(&loaded.scene, &placement, &settings);
+    Ok(Job { loaded, settings, placement, effects, targets })
+}
+
+/// The renderer, what it is (`gpu` or `cpu`), and how long linking and compiling took.
+fn open(
+    args: &RenderArgs,
+    job: &Job,
+    progress: &Progress,
+) -> Result<(Box<dyn Renderer>, &'static str, Duration)> {
+    let Job { loaded, settings, placement, effects, .. } = job;
+    if args.backend != BackendArg::Cpu {
+        let choice = args
+            .device
+            .as_deref()
+            .map_or(DeviceChoice::Best, |text| text.parse().unwrap_or_default());
+        match device::open(&choice) {
+            Ok(gpu) => {
+                let begin = Instant::now();
+                let renderer = GpuRenderer::new(gpu, &loaded.scene, placement, effects, settings)?;
+                return Ok((Box::new(renderer), "gpu", begin.elapsed()));
+            }
+            Err(error) if args.backend == BackendArg::Gpu || args.device.is_some() => {
+                return Err(error);
+            }
+            Err(_) => progress.warning(&format!(
+                "no usable GPU driver: rendering on the CPU reference, which is slower; {DRIVER_ADVICE}"
+            )),
+        }
+    }
+    let threads = args.threads.map_or(0, usize::from);
+    let renderer = ReferenceRenderer::new(&loaded.scene, placement, settings, threads)?;
+    Ok((Box::new(renderer), "cpu", Duration::ZERO))
+}
+
+/// What the user should know about the outcome.
+fn observations(outcome: &Outcome, settings: &Settings) -> Vec<String> {
+    let mut said = Vec::new();
+    if outcome.film.samples() > 0 && outcome.estimate.is_black() {
+        said.push("the image is black: no path has found any light".to_owned());
+    }
+    let asked = settings.error.filter(|_| outcome.stopped_by != StoppedBy::Error);
+    if let Some(limit) = asked
+        && settings.samples.end - settings.samples.start == MAXIMUM_SPP
+        && outcome.stopped_by == StoppedBy::Spp
+    {
+        said.push(format!(
+            "the error of {} was not reached within {MAXIMUM_SPP} samples a pixel",
+            percent(limit)
+        ));
+    }
+    said
+}
+
+fn statistics(job: &Job, outcome: &Outcome, backend: &str, device: Device) -> Stats {
+    let Job { loaded, settings, effects, .. } = job;
+    let film = &outcome.film;
+    let samples = film.samples() * settings.crop.pixels() as u64;
+    let tally = film.tally();
+    let start = settings.samples.start;
+    Stats {
+        version: env!("CARGO_PKG_VERSION").into(),
+        scene: loaded.name.clone(),
+        scene_hash: loaded.hash.clone(),
+        seed: settings.seed,
+        sample_range: [start, start + film.samples()],
+        spp: film.samples(),
+        width: settings.crop.width,
+        height: settings.crop.height,
+        backend: backend.into(),
+        device,
+        effects: effects.names().map(String::from).collect(),
+        geometry: effects.geometry().into(),
+        integrator: settings.integrator.name().into(),
+        sampler: "independent".into(),
+        max_bounces: settings.max_bounces,
+        roulette: settings.roulette,
+        seconds: Seconds::default(),
+        samples,
+        paths_per_second: samples as f64 / outcome.elapsed.as_secs_f64(),
+        rays: tally.rays,
+        estimated_error: outcome.estimate.error,
+        black: outcome.estimate.is_black(),
+        non_finite: tally.non_finite,
+        bounce_limit: BounceLimit {
+            paths: tally.cut_paths,
+            throughput: tally.cut_throughput,
+            energy_at_most: energy_cut_at_most(&loaded.scene, film),
+        },
+        stopped_by: outcome.stopped_by,
+        warnings: Vec::new(),
+    }
+}
+
+/// Writes what there is and prints the summary.
+fn finish(args: &RenderArgs, job: &Job, outcome: &Outcome, stats: &Stats) -> Result<()> {
+    if outcome.film.samples() == 0 {
+        // An empty image would replace an older, better one.
+        return match &outcome.failure {
+            Some(_) => Ok(()),
+            None => print("stopped before the first samples were done; nothing was written\n"),
+        };
+    }
+    let crop = job.settings.crop;
+    let picture = Picture::new(crop.width, crop.height, outcome.film.pixels());
+    let contents = Contents {
+        picture: &picture,
+        layers: &[],
+        metadata: &stats.metadata(),
+        exposure: args.exposure,
+    };
+    // The statistics are worth having even if an image cannot be written.
+    let written = write_all(&job.targets, &contents);
+    if let Some(path) = &args.stats {
+        stats.write(path)?;
+    }
+    written?;
+    if args.quiet { Ok(()) } else { print(&summary(job, stats)) }
+}
+
+/// One line.
+fn summary(job: &Job, stats: &Stats) -> String {
+    let files: Vec<String> = job.targets.iter().map(ToString::to_string).collect();
+    let error = match stats.estimated_error {
+        Some(error) => format!("error {}", percent(error)),
+        None if stats.black => "black".into(),
+        None => "error unknown below 64 spp".into(),
+    };
+    let stopped = match stats.stopped_by {
+        StoppedBy::Spp => "",
+        StoppedBy::Error => ", error reached",
+        StoppedBy::Time => ", time is up",
+        StoppedBy::Interrupt => ", interrupted",
+    };
+    let limit = &stats.bounce_limit;
+    let cut = match (limit.paths, limit.energy_at_most) {
+        (0, _) => String::new(),
+        (_, Some(energy)) => format!(", bounce limit took at most {} of the light", percent(energy)),
+        (paths, None) => format!(", bounce limit cut {paths} paths"),
+    };
+    format!(
+        "{}: {}x{}, {} spp{stopped}, {error}{cut}, {:.2} s, {} Mpaths/s on {}\n",
+        files.join(", "),
+        stats.width,
+        stats.height,
+        stats.spp,
+        stats.seconds.total,
+        significant(stats.paths_per_second * 1.0e-6),
+        stats.device.name,
+    )
+}
+
+/// A fraction as percent with three digits.
+fn percent(fraction: f64) -> String {
+    format!("{} %", significant(100.0 * fraction))
+}
+
+/// Three significant digits, in plain notation where that is short.
+fn significant(value: f64) -> String {
+    let digits = if value > 0.0 { 2 - value.log10().floor() as i32 } else { 0 };
+    if digits > 8 { format!("{value:.2e}") } else { format!("{value:.*}", digits.max(0) as usize) }
+}
+
+fn write_file(path: &Path, bytes: &[u8]) -> Result<()> {
+    atomic::write(path, bytes).map_err(|error| match error {
+        Error::File { action, source, .. } => Error::File { action, path: PathBuf::from(path), source },
+        other => other,
+    })
+}
+
+/// SIGINT and SIGTERM: the first asks to stop, the second ends the process.
+struct Signals {
+    interrupt: Arc<AtomicBool>,
+    terminate: Arc<AtomicBool>,
+}
+
+impl Signals {
+    fn listen() -> Result<Self> {
+        use signal_hook::consts::{SIGINT, SIGTERM};
+        let signals = Self { interrupt: Arc::default(), terminate: Arc::default() };
+        let register = |signal, flag: &Arc<AtomicBool>| {
+            signal_hook::flag::register_conditional_shutdown(signal, 128 + signal, Arc::clone(flag))?;
+            signal_hook::flag::register(signal, Arc::clone(flag))
+        };
+        register(SIGINT, &signals.interrupt)
+            .and_then(|_| register(SIGTERM, &signals.terminate))
+            .map_err(|e| Error::Usage(format!("cannot listen for signals: {e}")))?;
+        Ok(signals)
+    }
+
+    fn code(&self) -> Option<i32> {
+        if self.terminate.load(Ordering::Relaxed) {
+            return Some(143);
+        }
+        self.interrupt.load(Ordering::Relaxed).then_some(130)
+    }
+}
+
+/// Shows the render loop's status, and asks for signals.
+struct Display<'a> {
+    progress: &'a Progress,
+    signals: &'a Signals,
+    pixels: u64,
+    spp: u64,
+    time: Option<Duration>,
+    error: Option<f64>,
+    /// Where the current stretch of speed measurement began.
+    mark: (Duration, u64),
+    rate: f64,
+}
+
+impl<'a> Display<'a> {
+    fn new(progress: &'a Progress, signals: &'a Signals, settings: &Settings) -> Self {
+        Self {
+            progress,
+            signals,
+            pixels: settings.crop.pixels() as u64,
+            spp: settings.samples.end - settings.samples.start,
+            time: settings.time,
+            error: settings.error,
+            mark: (Duration::ZERO, 0),
+            rate: 0.0,
+        }
+    }
+}
+
+impl Watch for Display<'_> {
+    fn update(&mut self, status: &Status) {
+        let (since, before) = self.mark;
+        let stretch = (status.elapsed - since).as_secs_f64();
+        if stretch >= 0.5 || self.rate == 0.0 {
+            self.rate = (status.paths - before) as f64 / stretch.max(1.0e-9);
+            self.mark = (status.elapsed, status.paths);
+        }
+        let elapsed = status.elapsed.as_secs_f64();
+        // The nearest of the stop rules; an error falls with the root of the samples.
+        let by_spp = status.paths as f64 / status.total as f64;
+        let by_time = self.time.map_or(0.0, |time| elapsed / time.as_secs_f64());
+        let by_error = self.error.zip(status.error).map_or(0.0, |(want, have)| (want / have).powi(2));
+        let fraction = by_spp.max(by_time).max(by_error).min(1.0);
+        let remaining = (fraction > 0.0).then(|| elapsed * (1.0 / fraction - 1.0));
+        self.progress.update(&Snapshot {
+            samples: status.paths,
+            spp: status.paths / self.pixels,
+            spp_total: self.spp,
+            fraction,
+            elapsed: status.elapsed,
+            remaining: remaining.and_then(|s| Duration::try_from_secs_f64(s).ok()),
+            paths_per_second: self.rate,
+            error: status.error,
+        });
+    }
+
+    fn interrupted(&self) -> bool {
+        self.signals.code().is_some()
+    }
+}

@@ -1,0 +1,8 @@
+//! Twins of `shaders/bsdf/`.
+
+pub mod dielectric;
+pub mod diffuse;
+pub mod mirror;
+pub mod reflective;
+pub mod sample;
+pub mod scatter;

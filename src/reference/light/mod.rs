@@ -1,0 +1,11 @@
+//! Twins of `shaders/light/`.
+
+use glam::DVec3;
+
+use crate::scene::Scene;
+
+/// What a ray sees that hits nothing.
+#[must_use]
+pub fn environment_radiance(scene: &Scene) -> DVec3 {
+    scene.environment.unwrap_or_default()
+}

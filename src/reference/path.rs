@@ -1,0 +1,225 @@
+//! Twin of `shaders/path.wesl`: the same paths, one at a time, and the renderer around them.
+
+use std::ops::Range;
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::bsdf::scatter::scatter;
+use super::core::random::random4;
+use super::light::environment_radiance;
+use super::scene::camera::camera_ray;
+use super::scene::ray::{Ray, vertex_at};
+use super::scene::sphere::closest_hit;
+use crate::error::{Error, Result};
+use crate::film::{BLOCK, NonFinite, PixelSums, Tally, Window};
+use crate::placement::Placement;
+use crate::render::{Control, Renderer};
+use crate::scene::Scene;
+use crate::settings::{Integrator, Rect, Settings, stream_words};
+
+/// What one path found.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PathResult {
+    /// W/(sr m²) per channel.
+    pub radiance: DVec3,
+    /// Rays traced.
+    pub rays: u32,
+    /// Scattering events.
+    pub bounces: u32,
+    /// Throughput with which the bounce limit cut the path; zero if it did not.
+    pub cut: DVec3,
+}
+
+/// All that a path needs to know.
+#[derive(Clone, Copy, Debug)]
+pub struct PathTracer<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
+    /// The same, placed.
+    pub placement: &'a Placement,
+    /// The options.
+    pub settings: &'a Settings,
+}
+
+impl PathTracer<'_> {
+    /// Traces sample `sample` of `pixel`.
+    #[must_use]
+    pub fn trace(&self, pixel: [u32; 2], sample: u64) -> PathResult {
+        let Self { scene, placement, settings } = self;
+        let stream = stream_words(settings.seed, (sample >> 32) as u32);
+        let random = |dimension| random4(stream, pixel, sample as u32, dimension);
+        let lecture = matches!(settings.integrator, Integrator::Lecture { .. });
+        let mut ray = camera_ray(&placement.camera, pixel, random(0));
+        let mut result = PathResult::default();
+        let mut throughput = DVec3::ONE;
+        let mut compression = 1.0;
+        loop {
+            result.rays += 1;
+            let Some(hit) = closest_hit(&ray, &placement.spheres) else {
+                result.radiance += throughput * environment_radiance(scene);
+                return result;
+            };
+            let sphere = &placement.spheres[hit.index];
+            let material = &scene.materials[sphere.material];
+            result.radiance += throughput * material.emission;
+            if result.bounces == settings.max_bounces {
+                result.cut = throughput;
+                return result;
+            }
+            let u = random(result.bounces + 1);
+            let vertex = vertex_at(&ray, &hit, sphere);
+            let s = scatter(&material.kind, vertex.normal, ray.direction, hit.inside, u, lecture);
+            throughput *= s.weight;
+            compression *= s.compression;
+            let largest = (throughput * compression).max_element();
+            let survival = match settings.integrator {
+                Integrator::Lecture { termination } => 1.0 - termination,
+                Integrator::Bsdf if settings.roulette => largest.min(1.0),
+                Integrator::Bsdf => 1.0,
+            };
+            if largest <= 0.0 || u[3] >= survival {
+                return result;
+            }
+            throughput /= survival;
+            ray = Ray {
+                anchor: vertex.anchor,
+                offset: vertex.offset,
+                direction: s.direction,
+                own: Some(hit.index),
+                inward: hit.inside != s.crossed,
+            };
+            result.bounces += 1;
+        }
+    }
+}
+
+/// Renders windows on the CPU.
+#[derive(Debug)]
+pub struct ReferenceRenderer {
+    scene: Scene,
+    placement: Placement,
+    settings: Settings,
+    threads: rayon::ThreadPool,
+}
+
+impl ReferenceRenderer {
+    /// A renderer on `threads` threads; 0: one a core.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if the threads do not start.
+    pub fn new(
+        scene: &Scene,
+        placement: &Placement,
+        settings: &Settings,
+        threads: usize,
+    ) -> Result<Self> {
+        let threads = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .map_err(|e| Error::Device(format!("cannot start {threads} threads: {e}")))?;
+        Ok(Self {
+            scene: scene.clone(),
+            placement: placement.clone(),
+            settings: settings.clone(),
+            threads,
+        })
+    }
+
+    fn pixel(&self, pixel: [u32; 2], samples: &Range<u64>, state: &mut PixelState) {
+        let tracer =
+            PathTracer { scene: &self.scene, placement: &self.placement, settings: &self.settings };
+        for sample in samples.clone() {
+            let path = tracer.trace(pixel, sample);
+            state.add(pixel, sample, &path);
+        }
+    }
+}
+
+/// One pixel's sums in the middle of a window.
+#[derive(Clone, Debug, Default)]
+struct PixelState {
+    sums: PixelSums,
+    block: DVec3,
+    in_block: u64,
+    blocks: f64,
+    block_mean: DVec3,
+    tally: Tally,
+}
+
+impl PixelState {
+    fn add(&mut self, pixel: [u32; 2], sample: u64, path: &PathResult) {
+        self.tally.rays += u64::from(path.rays);
+        if path.cut.max_element() > 0.0 {
+            self.tally.cut_paths += 1;
+            self.tally.cut_throughput += path.cut.element_sum() / 3.0;
+        }
+        if path.radiance.is_finite() {
+            self.block += path.radiance;
+        } else {
+            self.tally.non_finite += 1;
+            let place = NonFinite { pixel, sample, bounce: path.bounces };
+            self.tally.first_non_finite = self.tally.first_non_finite.or(Some(place));
+        }
+        self.in_block += 1;
+        if (sample + 1).is_multiple_of(BLOCK) {
+            self.end_block();
+        }
+    }
+
+    fn end_block(&mut self) {
+        if self.in_block == BLOCK {
+            // Welford 1962.
+            self.blocks += 1.0;
+            let delta = self.block - self.block_mean;
+            self.block_mean += delta / self.blocks;
+            let m2 = delta * (self.block - self.block_mean);
+            self.sums.m2 = (DVec3::from(self.sums.m2) + m2).to_array();
+        }
+        self.sums.sum = (DVec3::from(self.sums.sum) + self.block).to_array();
+        self.block = DVec3::ZERO;
+        self.in_block = 0;
+    }
+}
+
+impl Renderer for ReferenceRenderer {
+    fn device(&self) -> (String, String, String) {
+        let threads = self.threads.current_num_threads();
+        (format!("CPU reference, f64, {threads} threads"), "cpu".into(), "none".into())
+    }
+
+    fn render(&mut self, samples: Range<u64>, control: &mut dyn Control) -> Result<Window> {
+        let crop: Rect = self.settings.crop;
+        let width = crop.width as usize;
+        let mut state = vec![PixelState::default(); crop.pixels()];
+        let mut start = samples.start;
+        while start < samples.end {
+            // A block at a time over the whole image: then it can stop.
+            let end = (start / BLOCK * BLOCK + BLOCK).min(samples.end);
+            self.threads.install(|| {
+                state.par_chunks_mut(width).enumerate().for_each(|(y, row)| {
+                    for (x, state) in row.iter_mut().enumerate() {
+                        let pixel = [crop.x + x as u32, crop.y + y as u32];
+                        self.pixel(pixel, &(start..end), state);
+                    }
+                });
+            });
+            let paths = crop.pixels() as u64 * (end - start);
+            start = end;
+            if !control.proceed(paths) {
+                break;
+            }
+        }
+        let mut tally = Tally::default();
+        for pixel in &mut state {
+            pixel.end_block();
+            tally.add(&pixel.tally);
+        }
+        Ok(Window {
+            rect: crop,
+            samples: samples.start..start,
+            pixels: state.into_iter().map(|s| s.sums).collect(),
+            tally,
+        })
+    }
+}
