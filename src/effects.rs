@@ -134,7 +134,10 @@ impl Effects {
                 what: "constant light from everywhere",
                 reasons: match scene.environment {
                     Some(e) if e.max_element() > 0.0 => {
-                        vec![format!("environment: radiance = [{}, {}, {}]", e.x, e.y, e.z)]
+                        vec![format!(
+                            "environment: radiance = [{}, {}, {}]",
+                            e.x, e.y, e.z
+                        )]
                     }
                     _ => vec![],
                 },
@@ -166,7 +169,10 @@ impl Effects {
     pub fn of(scene: &Scene, placement: &Placement, settings: &Settings, names: &[&str]) -> Self {
         let mut effects = Self::derive(scene, placement, settings);
         for name in names {
-            assert!(effects.table.iter().any(|e| e.name == *name), "no effect {name}");
+            assert!(
+                effects.table.iter().any(|e| e.name == *name),
+                "no effect {name}"
+            );
         }
         for effect in &mut effects.table {
             effect.reasons.clear();
@@ -195,7 +201,9 @@ impl Effects {
     #[must_use]
     pub fn has(&self, name: &str) -> bool {
         let effect = self.table.iter().find(|e| e.name == name);
-        effect.unwrap_or_else(|| panic!("no effect is called {name}")).used()
+        effect
+            .unwrap_or_else(|| panic!("no effect is called {name}"))
+            .used()
     }
 
     /// Name and state of every flag that the kernel's sources may ask for.

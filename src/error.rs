@@ -46,7 +46,12 @@ impl Error {
     #[must_use]
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Scene(_) | Self::Usage(_) | Self::File { action: "cannot read", .. } => 2,
+            Self::Scene(_)
+            | Self::Usage(_)
+            | Self::File {
+                action: "cannot read",
+                ..
+            } => 2,
             Self::Interrupted(code) => u8::try_from(*code).unwrap_or(1),
             _ => 1,
         }

@@ -31,7 +31,9 @@ impl Estimate {
                 sum + (0..3).map(|c| v[c] / (m[c] * m[c] + floor)).sum::<f64>()
             });
         }
-        let error = sum.map(|sum| (sum / values).sqrt()).filter(|e| e.is_finite() && floor > 0.0);
+        let error = sum
+            .map(|sum| (sum / values).sqrt())
+            .filter(|e| e.is_finite() && floor > 0.0);
         Self { mean, error }
     }
 
@@ -53,15 +55,23 @@ pub fn energy_cut_at_most(scene: &Scene, film: &Film) -> Option<f64> {
     if tally.cut_paths == 0 {
         return Some(0.0);
     }
-    let used = || scene.spheres.iter().map(|sphere| &scene.materials[sphere.material]);
+    let used = || {
+        scene
+            .spheres
+            .iter()
+            .map(|sphere| &scene.materials[sphere.material])
+    };
     let albedo = used()
         .map(|material| match material.kind {
             MaterialKind::Diffuse { albedo } => albedo.max_element(),
             MaterialKind::Mirror { reflectance } => reflectance.max_element(),
             MaterialKind::Dielectric { .. } => 1.0,
-            MaterialKind::Reflective { albedo, specular, epsilon, mu } => {
-                (albedo + specular * (mu * PI * epsilon * (2.0 - epsilon))).max_element()
-            }
+            MaterialKind::Reflective {
+                albedo,
+                specular,
+                epsilon,
+                mu,
+            } => (albedo + specular * (mu * PI * epsilon * (2.0 - epsilon))).max_element(),
         })
         .fold(0.0, f64::max);
     let emitted = used()

@@ -129,8 +129,16 @@ impl Film {
         // Chan, Golub and LeVeque 1979: M2 = M2a + M2b + (mean_b - mean_a)^2 na nb/(na + nb), here
         // of block sums, whose mean is BLOCK times the pixel's mean.
         let (na, nb) = (self.blocks as f64, blocks as f64);
-        let weight = if na + nb > 0.0 { na * nb / (na + nb) } else { 0.0 };
-        let scale_a = if self.samples > 0 { BLOCK as f64 / self.samples as f64 } else { 0.0 };
+        let weight = if na + nb > 0.0 {
+            na * nb / (na + nb)
+        } else {
+            0.0
+        };
+        let scale_a = if self.samples > 0 {
+            BLOCK as f64 / self.samples as f64
+        } else {
+            0.0
+        };
         let scale_b = BLOCK as f64 / added;
         for ((sum, m2), pixel) in self.sum.iter_mut().zip(&mut self.m2).zip(&window.pixels) {
             for c in 0..3 {
@@ -185,6 +193,8 @@ impl Film {
     /// The means as linear f32, rows from the top.
     #[must_use]
     pub fn pixels(&self) -> Vec<[f32; 3]> {
-        (0..self.sum.len()).map(|i| self.mean(i).map(|x| x as f32)).collect()
+        (0..self.sum.len())
+            .map(|i| self.mean(i).map(|x| x as f32))
+            .collect()
     }
 }

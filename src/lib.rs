@@ -19,15 +19,15 @@
 //! [`error`] is what can go wrong anywhere.
 
 pub mod cli;
-pub mod settings;
-pub mod scene;
-pub mod placement;
 pub mod effects;
-pub mod shader;
+pub mod error;
+pub mod estimate;
+pub mod film;
 pub mod gpu;
+pub mod output;
+pub mod placement;
 pub mod reference;
 pub mod render;
-pub mod film;
-pub mod estimate;
-pub mod output;
-pub mod error;
+pub mod scene;
+pub mod settings;
+pub mod shader;

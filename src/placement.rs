@@ -99,14 +99,16 @@ impl Placement {
         // In units of the origin from here on: the subtraction in f64 is the last place that sees
         // world coordinates.
         let centers: Vec<DVec3> = scene.spheres.iter().map(|s| s.center - origin).collect();
-        let poles: Vec<Option<DVec3>> =
-            (0..centers.len()).map(|i| pole_normal(scene, &centers, i)).collect();
+        let poles: Vec<Option<DVec3>> = (0..centers.len())
+            .map(|i| pole_normal(scene, &centers, i))
+            .collect();
         let scale = unit(scene, &centers, &poles);
         let mut spheres: Vec<PlacedSphere> = (0..centers.len())
             .map(|i| {
                 let sphere = &scene.spheres[i];
                 let normal = poles[i];
-                let anchor = normal.map_or(centers[i], |n| pole_point(centers[i], sphere.radius, n));
+                let anchor =
+                    normal.map_or(centers[i], |n| pole_point(centers[i], sphere.radius, n));
                 PlacedSphere {
                     source: i,
                     material: sphere.material,
@@ -120,7 +122,12 @@ impl Placement {
         spheres.sort_by_key(|s| (s.pole.is_none(), s.source));
         let poles = spheres.iter().filter(|s| s.pole.is_some()).count();
         let camera = place_camera(scene, forward, approach, scale, width, height);
-        Self { scale, spheres, poles, camera }
+        Self {
+            scale,
+            spheres,
+            poles,
+            camera,
+        }
     }
 }
 
@@ -135,7 +142,11 @@ fn approach(scene: &Scene, forward: DVec3) -> f64 {
         .filter(|(depth, radius)| depth + radius > 0.0)
         .map(|(depth, radius)| depth - radius)
         .fold(f64::INFINITY, f64::min);
-    if nearest.is_finite() { nearest.max(0.0) } else { 0.0 }
+    if nearest.is_finite() {
+        nearest.max(0.0)
+    } else {
+        0.0
+    }
 }
 
 /// The pole's outward normal, if sphere `i` needs a pole frame: there are the camera or much
@@ -182,12 +193,19 @@ fn unit(scene: &Scene, centers: &[DVec3], poles: &[Option<DVec3>]) -> f64 {
             None => centers[i].length() + scene.spheres[i].radius,
         })
         .fold(0.0, f64::max);
-    if extent > 0.0 { (-extent.log2().floor()).exp2() } else { 1.0 }
+    if extent > 0.0 {
+        (-extent.log2().floor()).exp2()
+    } else {
+        1.0
+    }
 }
 
 fn side(scene: &Scene, i: usize) -> Side {
     let sphere = &scene.spheres[i];
-    if matches!(scene.materials[sphere.material].kind, MaterialKind::Dielectric { .. }) {
+    if matches!(
+        scene.materials[sphere.material].kind,
+        MaterialKind::Dielectric { .. }
+    ) {
         return Side::Either;
     }
     let distance = scene.camera.position.distance(sphere.center);
@@ -220,7 +238,11 @@ fn place_camera(
     let (across, down) = (pixel * right, -pixel * up);
     let corner = -0.5 * (f64::from(width) * across + f64::from(height) * down);
     let lens = camera.aperture_radius * scale;
-    let focus = if lens > 0.0 { 1.0 / (camera.focus_distance * scale) } else { 0.0 };
+    let focus = if lens > 0.0 {
+        1.0 / (camera.focus_distance * scale)
+    } else {
+        0.0
+    };
     let approach = approach * scale;
     PlacedCamera {
         // The origin is where the rays start.

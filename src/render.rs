@@ -7,7 +7,6 @@ use crate::error::Result;
 use crate::estimate::Estimate;
 use crate::film::{Film, Window, window_end};
 use crate::settings::Settings;
-pub use crate::output::stats::StoppedBy;
 
 /// Renders windows of samples: the GPU or the CPU reference. What comes after does not know which.
 pub trait Renderer {
@@ -26,6 +25,20 @@ pub trait Renderer {
 pub trait Control {
     /// Takes note that `paths` more paths are done; says whether to go on.
     fn proceed(&mut self, paths: u64) -> bool;
+}
+
+/// What ended a render: whichever came first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum StoppedBy {
+    /// All samples were taken.
+    Spp,
+    /// The error fell to what was asked for.
+    Error,
+    /// The time was up.
+    Time,
+    /// The user or the system said so.
+    Interrupt,
 }
 
 /// Where a render is, for a progress display.
@@ -87,8 +100,18 @@ pub fn render(renderer: &mut dyn Renderer, settings: &Settings, watch: &mut dyn 
     let pixels = settings.crop.pixels() as u64;
     let total = (settings.samples.end - settings.samples.start).saturating_mul(pixels);
     let begin = Instant::now();
-    let status = Status { paths: 0, total, elapsed: Duration::ZERO, error: None };
-    let mut control = Loop { watch, begin, deadline: settings.time, status };
+    let status = Status {
+        paths: 0,
+        total,
+        elapsed: Duration::ZERO,
+        error: None,
+    };
+    let mut control = Loop {
+        watch,
+        begin,
+        deadline: settings.time,
+        status,
+    };
     let mut start = settings.samples.start;
     let mut failure = None;
     let stopped_by = loop {
@@ -114,11 +137,20 @@ pub fn render(renderer: &mut dyn Renderer, settings: &Settings, watch: &mut dyn 
         }
         estimate = Estimate::of(&film);
         control.status.error = estimate.error;
-        if settings.error.is_some_and(|limit| estimate.error.is_some_and(|e| e <= limit)) {
+        if settings
+            .error
+            .is_some_and(|limit| estimate.error.is_some_and(|e| e <= limit))
+        {
             break StoppedBy::Error;
         }
     };
-    Outcome { film, estimate, stopped_by, elapsed: begin.elapsed(), failure }
+    Outcome {
+        film,
+        estimate,
+        stopped_by,
+        elapsed: begin.elapsed(),
+        failure,
+    }
 }
 
 /// Runs a render loop without display, signals or stop rules: for benchmarks and tests.

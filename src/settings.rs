@@ -47,7 +47,12 @@ impl Settings {
         Self {
             width: scene.width,
             height: scene.height,
-            crop: Rect { x: 0, y: 0, width: scene.width, height: scene.height },
+            crop: Rect {
+                x: 0,
+                y: 0,
+                width: scene.width,
+                height: scene.height,
+            },
             samples: 0..scene.render.spp.unwrap_or(DEFAULT_SPP),
             seed: 0,
             max_bounces: scene.render.max_bounces.unwrap_or(DEFAULT_MAX_BOUNCES),

@@ -16,17 +16,31 @@ use crate::settings::{
 
 /// The options of `render`.
 #[derive(Clone, Debug, Args)]
-#[expect(missing_docs, reason = "the help text says more: it would show here too")]
+#[expect(
+    missing_docs,
+    reason = "the help text says more: it would show here too"
+)]
 pub struct RenderArgs {
-    #[arg(value_name = "SCENE", help = "A scene file, or the name of a built-in scene [default: lecture]")]
+    #[arg(
+        value_name = "SCENE",
+        help = "A scene file, or the name of a built-in scene [default: lecture]"
+    )]
     pub scene: Option<String>,
 
     #[arg(
-        short, long, value_name = "FILE", help_heading = "Output",
+        short,
+        long,
+        value_name = "FILE",
+        help_heading = "Output",
         help = "Image to write: .png, .exr or .npy; may be repeated [default: SCENE.png]"
     )]
     pub output: Vec<PathBuf>,
-    #[arg(long, value_name = "FILE.json", help_heading = "Output", help = "Write statistics as JSON")]
+    #[arg(
+        long,
+        value_name = "FILE.json",
+        help_heading = "Output",
+        help = "Write statistics as JSON"
+    )]
     pub stats: Option<PathBuf>,
     #[arg(
         long, value_name = "EV", value_parser = values::exposure, default_value = "0",
@@ -35,19 +49,37 @@ pub struct RenderArgs {
     )]
     pub exposure: f64,
     #[arg(
-        long, value_name = "FILE", help_heading = "Output",
+        long,
+        value_name = "FILE",
+        help_heading = "Output",
         help = "Write the kernel as plain WGSL before rendering"
     )]
     pub dump_wgsl: Option<PathBuf>,
     #[arg(
-        long, value_name = "MODE", value_enum, default_value = "auto", hide_possible_values = true,
-        hide_default_value = true, help_heading = "Output",
+        long,
+        value_name = "MODE",
+        value_enum,
+        default_value = "auto",
+        hide_possible_values = true,
+        hide_default_value = true,
+        help_heading = "Output",
         help = "Progress on stderr: auto (a bar on a terminal), plain, json, none"
     )]
     pub progress: ProgressArg,
-    #[arg(short, long, conflicts_with = "verbose", help_heading = "Output", help = "Say nothing but warnings and errors")]
+    #[arg(
+        short,
+        long,
+        conflicts_with = "verbose",
+        help_heading = "Output",
+        help = "Say nothing but warnings and errors"
+    )]
     pub quiet: bool,
-    #[arg(short, long, help_heading = "Output", help = "Say more: device, effects, times")]
+    #[arg(
+        short,
+        long,
+        help_heading = "Output",
+        help = "Say more: device, effects, times"
+    )]
     pub verbose: bool,
 
     #[arg(
@@ -83,20 +115,34 @@ pub struct RenderArgs {
     )]
     pub crop: Option<Rect>,
     #[arg(
-        long, value_name = "N", default_value = "0", hide_default_value = true,
-        help_heading = "Image", help = "Seed of the random numbers [default: 0]"
+        long,
+        value_name = "N",
+        default_value = "0",
+        hide_default_value = true,
+        help_heading = "Image",
+        help = "Seed of the random numbers [default: 0]"
     )]
     pub seed: u64,
 
     #[arg(
-        long, value_name = "NAME", value_enum, default_value = "bsdf", hide_possible_values = true,
-        hide_default_value = true, help_heading = "Light transport",
+        long,
+        value_name = "NAME",
+        value_enum,
+        default_value = "bsdf",
+        hide_possible_values = true,
+        hide_default_value = true,
+        help_heading = "Light transport",
         help = "Estimator: bsdf (BSDF sampling) or lecture (uniform hemisphere, constant p) [default: bsdf]"
     )]
     pub integrator: IntegratorArg,
     #[arg(
-        long, value_name = "NAME", value_enum, default_value = "independent",
-        hide_possible_values = true, hide_default_value = true, help_heading = "Light transport",
+        long,
+        value_name = "NAME",
+        value_enum,
+        default_value = "independent",
+        hide_possible_values = true,
+        hide_default_value = true,
+        help_heading = "Light transport",
         help = "Sample placement: independent [default: independent]"
     )]
     pub sampler: SamplerArg,
@@ -107,7 +153,10 @@ pub struct RenderArgs {
     )]
     pub max_bounces: Option<u32>,
     #[arg(
-        long, value_name = "on|off", value_enum, help_heading = "Light transport",
+        long,
+        value_name = "on|off",
+        value_enum,
+        help_heading = "Light transport",
         hide_possible_values = true,
         help = "End weak paths early by Russian roulette, without bias [default: on]"
     )]
@@ -119,19 +168,31 @@ pub struct RenderArgs {
     pub termination: Option<f64>,
 
     #[arg(
-        long, value_name = "NAME", value_enum, default_value = "auto", hide_possible_values = true,
-        hide_default_value = true, help_heading = "Device",
+        long,
+        value_name = "NAME",
+        value_enum,
+        default_value = "auto",
+        hide_possible_values = true,
+        hide_default_value = true,
+        help_heading = "Device",
         help = "What renders: auto, gpu, or cpu (the f64 reference) [default: auto]"
     )]
     pub backend: BackendArg,
     #[arg(
-        long, value_name = "INDEX|NAME", help_heading = "Device",
+        long,
+        value_name = "INDEX|NAME",
+        help_heading = "Device",
         help = "Which adapter, as `gpu-trace devices` lists them"
     )]
     pub device: Option<String>,
     #[arg(
-        long, value_name = "FORM", value_enum, default_value = "auto", hide_possible_values = true,
-        hide_default_value = true, help_heading = "Device",
+        long,
+        value_name = "FORM",
+        value_enum,
+        default_value = "auto",
+        hide_possible_values = true,
+        hide_default_value = true,
+        help_heading = "Device",
         help = "Spheres in the kernel: auto, baked (constants) or list (a buffer) [default: auto]"
     )]
     pub geometry: GeometryArg,
@@ -188,7 +249,12 @@ impl RenderArgs {
         if let Some((width, height)) = self.size {
             (settings.width, settings.height) = (width, height);
         }
-        let whole = Rect { x: 0, y: 0, width: settings.width, height: settings.height };
+        let whole = Rect {
+            x: 0,
+            y: 0,
+            width: settings.width,
+            height: settings.height,
+        };
         settings.crop = self.crop.unwrap_or(whole);
         let crop = &settings.crop;
         let fits = |at: u32, size: u32, all: u32| u64::from(at) + u64::from(size) <= u64::from(all);
@@ -232,7 +298,9 @@ impl RenderArgs {
         settings.error = self.error;
         settings.time = self.time;
         if self.backend == BackendArg::Cpu && self.device.is_some() {
-            return Err(Error::Usage("--device chooses a GPU, --backend cpu uses none".into()));
+            return Err(Error::Usage(
+                "--device chooses a GPU, --backend cpu uses none".into(),
+            ));
         }
         Ok(settings)
     }

@@ -51,6 +51,9 @@ pub(super) fn run(json: bool) -> Result<()> {
         let _ = writeln!(text, "no adapters; {DRIVER_ADVICE}");
     }
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    let _ = writeln!(text, "cpu: the f64 reference on {threads} threads (--backend cpu)");
+    let _ = writeln!(
+        text,
+        "cpu: the f64 reference on {threads} threads (--backend cpu)"
+    );
     print(&text)
 }

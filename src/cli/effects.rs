@@ -46,7 +46,12 @@ pub(super) fn run(args: &RenderArgs, json: bool) -> Result<()> {
 
 fn table(scene: &str, effects: &Effects, lines: usize) -> String {
     let mut text = format!("{scene}: a kernel of {lines} lines\n\nIn the kernel\n");
-    let width = effects.table().iter().map(|e| e.name.len()).max().unwrap_or(0);
+    let width = effects
+        .table()
+        .iter()
+        .map(|e| e.name.len())
+        .max()
+        .unwrap_or(0);
     for effect in effects.table().iter().filter(|e| e.used()) {
         let _ = writeln!(text, "  {:width$}  {}", effect.name, effect.what);
         let _ = writeln!(text, "  {:width$}    for {}", "", effect.reasons.join("; "));

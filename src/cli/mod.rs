@@ -110,7 +110,11 @@ pub fn main() -> u8 {
             let text = error.to_string();
             if !matches!(error, Error::Interrupted(_)) {
                 // Scene errors come with their own heading.
-                let heading = if text.starts_with("error") { "" } else { "error: " };
+                let heading = if text.starts_with("error") {
+                    ""
+                } else {
+                    "error: "
+                };
                 let _ = writeln!(std::io::stderr(), "{heading}{text}");
             }
             error.exit_code()
@@ -135,10 +139,15 @@ fn run(cli: Cli) -> Result<()> {
 /// Prints a result. A reader that has seen enough (`| head`) is no error.
 fn print(text: &str) -> Result<()> {
     let mut stdout = std::io::stdout().lock();
-    match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
-        Err(source) if source.kind() != std::io::ErrorKind::BrokenPipe => {
-            Err(Error::File { action: "cannot write", path: PathBuf::from("stdout"), source })
-        }
+    match stdout
+        .write_all(text.as_bytes())
+        .and_then(|()| stdout.flush())
+    {
+        Err(source) if source.kind() != std::io::ErrorKind::BrokenPipe => Err(Error::File {
+            action: "cannot write",
+            path: PathBuf::from("stdout"),
+            source,
+        }),
         _ => Ok(()),
     }
 }

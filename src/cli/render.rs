@@ -49,8 +49,14 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
     let setup = begin.elapsed().saturating_sub(compile);
     let (name, interface, driver) = renderer.device();
     if args.verbose {
-        progress.message(&format!("device: {name} ({interface}, {driver}), open in {:.2?}", opening.elapsed()));
-        progress.message(&format!("effects: {}", job.effects.names().collect::<Vec<_>>().join(", ")));
+        progress.message(&format!(
+            "device: {name} ({interface}, {driver}), open in {:.2?}",
+            opening.elapsed()
+        ));
+        progress.message(&format!(
+            "effects: {}",
+            job.effects.names().collect::<Vec<_>>().join(", ")
+        ));
     }
     for warning in &warnings {
         progress.warning(warning);
@@ -64,7 +70,16 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
     for warning in &warnings[job.loaded.warnings.len()..] {
         progress.warning(warning);
     }
-    let stats = statistics(&job, &outcome, backend, Device { name, backend: interface, driver });
+    let stats = statistics(
+        &job,
+        &outcome,
+        backend,
+        Device {
+            name,
+            backend: interface,
+            driver,
+        },
+    );
     let stats = Stats {
         seconds: Seconds {
             total: begin.elapsed().as_secs_f64(),
@@ -83,10 +98,16 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
         return Err(Error::NonFinite(format!(
             "{} samples were not finite and are in no sum; the first: pixel ({}, {}), sample {}, \
              after bounce {}",
-            outcome.film.tally().non_finite, first.pixel[0], first.pixel[1], first.sample, first.bounce
+            outcome.film.tally().non_finite,
+            first.pixel[0],
+            first.pixel[1],
+            first.sample,
+            first.bounce
         )));
     }
-    signals.code().map_or(Ok(()), |code| Err(Error::Interrupted(code)))
+    signals
+        .code()
+        .map_or(Ok(()), |code| Err(Error::Interrupted(code)))
 }
 
 /// Loads and decides everything; checks the outputs. Touches no device and no file.
@@ -96,16 +117,29 @@ fn prepare(args: &RenderArgs) -> Result<Job> {
     let targets = if args.output.is_empty() {
         vec![Target::parse(format!("{}.png", loaded.name))?]
     } else {
-        args.output.iter().map(Target::parse).collect::<Result<_>>()?
+        args.output
+            .iter()
+            .map(Target::parse)
+            .collect::<Result<_>>()?
     };
     let mut outputs: Vec<&Path> = targets.iter().map(|t| t.path.as_path()).collect();
     outputs.extend(args.stats.as_deref());
     outputs.extend(args.dump_wgsl.as_deref());
-    let scene_file = args.scene.as_deref().map(Path::new).filter(|path| path.is_file());
+    let scene_file = args
+        .scene
+        .as_deref()
+        .map(Path::new)
+        .filter(|path| path.is_file());
     check_all(&outputs, scene_file.as_slice())?;
     let placement = Placement::new(&loaded.scene, settings.width, settings.height);
     let effects = Effects::derive(&loaded.scene, &placement, &settings);
-    Ok(Job { loaded, settings, placement, effects, targets })
+    Ok(Job {
+        loaded,
+        settings,
+        placement,
+        effects,
+        targets,
+    })
 }
 
 /// The renderer, what it is (`gpu` or `cpu`), and how long linking and compiling took.
@@ -114,7 +148,13 @@ fn open(
     job: &Job,
     progress: &Progress,
 ) -> Result<(Box<dyn Renderer>, &'static str, Duration)> {
-    let Job { loaded, settings, placement, effects, .. } = job;
+    let Job {
+        loaded,
+        settings,
+        placement,
+        effects,
+        ..
+    } = job;
     if args.backend != BackendArg::Cpu {
         let choice = args
             .device
@@ -145,7 +185,9 @@ fn observations(outcome: &Outcome, settings: &Settings) -> Vec<String> {
     if outcome.film.samples() > 0 && outcome.estimate.is_black() {
         said.push("the image is black: no path has found any light".to_owned());
     }
-    let asked = settings.error.filter(|_| outcome.stopped_by != StoppedBy::Error);
+    let asked = settings
+        .error
+        .filter(|_| outcome.stopped_by != StoppedBy::Error);
     if let Some(limit) = asked
         && settings.samples.end - settings.samples.start == MAXIMUM_SPP
         && outcome.stopped_by == StoppedBy::Spp
@@ -159,7 +201,12 @@ fn observations(outcome: &Outcome, settings: &Settings) -> Vec<String> {
 }
 
 fn statistics(job: &Job, outcome: &Outcome, backend: &str, device: Device) -> Stats {
-    let Job { loaded, settings, effects, .. } = job;
+    let Job {
+        loaded,
+        settings,
+        effects,
+        ..
+    } = job;
     let film = &outcome.film;
     let samples = film.samples() * settings.crop.pixels() as u64;
     let tally = film.tally();
@@ -221,7 +268,11 @@ fn finish(args: &RenderArgs, job: &Job, outcome: &Outcome, stats: &Stats) -> Res
         stats.write(path)?;
     }
     written?;
-    if args.quiet { Ok(()) } else { print(&summary(job, stats)) }
+    if args.quiet {
+        Ok(())
+    } else {
+        print(&summary(job, stats))
+    }
 }
 
 /// One line.
@@ -241,7 +292,10 @@ fn summary(job: &Job, stats: &Stats) -> String {
     let limit = &stats.bounce_limit;
     let cut = match (limit.paths, limit.energy_at_most) {
         (0, _) => String::new(),
-        (_, Some(energy)) => format!(", bounce limit took at most {} of the light", percent(energy)),
+        (_, Some(energy)) => format!(
+            ", bounce limit took at most {} of the light",
+            percent(energy)
+        ),
         (paths, None) => format!(", bounce limit cut {paths} paths"),
     };
     format!(
@@ -263,13 +317,25 @@ fn percent(fraction: f64) -> String {
 
 /// Three significant digits, in plain notation where that is short.
 fn significant(value: f64) -> String {
-    let digits = if value > 0.0 { 2 - value.log10().floor() as i32 } else { 0 };
-    if digits > 8 { format!("{value:.2e}") } else { format!("{value:.*}", digits.max(0) as usize) }
+    let digits = if value > 0.0 {
+        2 - value.log10().floor() as i32
+    } else {
+        0
+    };
+    if digits > 8 {
+        format!("{value:.2e}")
+    } else {
+        format!("{value:.*}", digits.max(0) as usize)
+    }
 }
 
 fn write_file(path: &Path, bytes: &[u8]) -> Result<()> {
     atomic::write(path, bytes).map_err(|error| match error {
-        Error::File { action, source, .. } => Error::File { action, path: PathBuf::from(path), source },
+        Error::File { action, source, .. } => Error::File {
+            action,
+            path: PathBuf::from(path),
+            source,
+        },
         other => other,
     })
 }
@@ -283,9 +349,16 @@ struct Signals {
 impl Signals {
     fn listen() -> Result<Self> {
         use signal_hook::consts::{SIGINT, SIGTERM};
-        let signals = Self { interrupt: Arc::default(), terminate: Arc::default() };
+        let signals = Self {
+            interrupt: Arc::default(),
+            terminate: Arc::default(),
+        };
         let register = |signal, flag: &Arc<AtomicBool>| {
-            signal_hook::flag::register_conditional_shutdown(signal, 128 + signal, Arc::clone(flag))?;
+            signal_hook::flag::register_conditional_shutdown(
+                signal,
+                128 + signal,
+                Arc::clone(flag),
+            )?;
             signal_hook::flag::register(signal, Arc::clone(flag))
         };
         register(SIGINT, &signals.interrupt)
@@ -342,7 +415,10 @@ impl Watch for Display<'_> {
         // The nearest of the stop rules; an error falls with the root of the samples.
         let by_spp = status.paths as f64 / status.total as f64;
         let by_time = self.time.map_or(0.0, |time| elapsed / time.as_secs_f64());
-        let by_error = self.error.zip(status.error).map_or(0.0, |(want, have)| (want / have).powi(2));
+        let by_error = self
+            .error
+            .zip(status.error)
+            .map_or(0.0, |(want, have)| (want / have).powi(2));
         let fraction = by_spp.max(by_time).max(by_error).min(1.0);
         let remaining = (fraction > 0.0).then(|| elapsed * (1.0 / fraction - 1.0));
         self.progress.update(&Snapshot {

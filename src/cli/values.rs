@@ -14,12 +14,18 @@ pub(super) fn error(text: &str) -> Result<f64, String> {
         Some(number) => (number.trim_end(), 0.01),
         None => (text, 1.0),
     };
-    let value = number.parse::<f64>().map_err(|_| "not a number; try 1% or 0.01")? * scale;
+    let value = number
+        .parse::<f64>()
+        .map_err(|_| "not a number; try 1% or 0.01")?
+        * scale;
     if !(value.is_finite() && value > 0.0) {
         return Err("an error to reach is above 0; try 1% or 0.01".into());
     }
     if value >= 1.0 {
-        return Err(format!("{} % is no error to aim for; for {value} % write {value}%", value * 100.0));
+        return Err(format!(
+            "{} % is no error to aim for; for {value} % write {value}%",
+            value * 100.0
+        ));
     }
     Ok(value)
 }
@@ -82,11 +88,19 @@ pub(super) fn crop(text: &str) -> Result<Rect, String> {
     let form = "write X,Y,WIDTHxHEIGHT, as in 100,50,64x64";
     let mut parts = text.splitn(3, ',');
     let mut number = || -> Result<u32, String> {
-        parts.next().and_then(|n| n.trim().parse().ok()).ok_or_else(|| form.to_owned())
+        parts
+            .next()
+            .and_then(|n| n.trim().parse().ok())
+            .ok_or_else(|| form.to_owned())
     };
     let (x, y) = (number()?, number()?);
     let (width, height) = size(parts.next().ok_or(form)?.trim())?;
-    Ok(Rect { x, y, width, height })
+    Ok(Rect {
+        x,
+        y,
+        width,
+        height,
+    })
 }
 
 /// A probability, in [0, 1).
@@ -135,7 +149,15 @@ mod tests {
     fn ranges_sizes_and_crops() {
         assert_eq!(range("16..48"), Ok(16..48));
         assert_eq!(size("640x480"), Ok((640, 480)));
-        assert_eq!(crop("1,2,3x4"), Ok(Rect { x: 1, y: 2, width: 3, height: 4 }));
+        assert_eq!(
+            crop("1,2,3x4"),
+            Ok(Rect {
+                x: 1,
+                y: 2,
+                width: 3,
+                height: 4
+            })
+        );
         for wrong in ["", "3", "5..5", "6..5", "a..b", "0..=5", "-1..2"] {
             assert!(range(wrong).is_err(), "{wrong}");
         }

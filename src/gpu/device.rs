@@ -53,7 +53,9 @@ impl std::str::FromStr for DeviceChoice {
     type Err = std::convert::Infallible;
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
-        Ok(text.parse().map_or_else(|_| Self::Name(text.to_owned()), Self::Index))
+        Ok(text
+            .parse()
+            .map_or_else(|_| Self::Name(text.to_owned()), Self::Index))
     }
 }
 
@@ -127,13 +129,28 @@ fn lacks(adapter: &wgpu::Adapter, limits: &wgpu::Limits) -> Option<String> {
         return Some("no compute shaders".into());
     }
     let storage = adapter.get_texture_format_features(wgpu::TextureFormat::Rgba32Float);
-    if !storage.allowed_usages.contains(wgpu::TextureUsages::STORAGE_BINDING) {
+    if !storage
+        .allowed_usages
+        .contains(wgpu::TextureUsages::STORAGE_BINDING)
+    {
         return Some("no rgba32float storage textures".into());
     }
     let needs = [
-        ("storage textures a stage", limits.max_storage_textures_per_shader_stage, 3),
-        ("storage buffers a stage", limits.max_storage_buffers_per_shader_stage, 6),
-        ("invocations a workgroup", limits.max_compute_invocations_per_workgroup, 64),
+        (
+            "storage textures a stage",
+            limits.max_storage_textures_per_shader_stage,
+            3,
+        ),
+        (
+            "storage buffers a stage",
+            limits.max_storage_buffers_per_shader_stage,
+            6,
+        ),
+        (
+            "invocations a workgroup",
+            limits.max_compute_invocations_per_workgroup,
+            64,
+        ),
     ];
     needs
         .iter()
@@ -144,7 +161,10 @@ fn lacks(adapter: &wgpu::Adapter, limits: &wgpu::Limits) -> Option<String> {
 /// All adapters, in the order in which `--device INDEX` counts them.
 #[must_use]
 pub fn list() -> Vec<AdapterSummary> {
-    candidates(None).into_iter().map(|(_, summary)| summary).collect()
+    candidates(None)
+        .into_iter()
+        .map(|(_, summary)| summary)
+        .collect()
 }
 
 /// What to do where there is no adapter.
@@ -158,9 +178,15 @@ pub const DRIVER_ADVICE: &str = "to get one without a GPU, install Mesa's lavapi
 pub fn open(choice: &DeviceChoice) -> Result<Gpu> {
     let adapters = candidates(Some(choice));
     let known = || {
-        let names: Vec<String> =
-            adapters.iter().map(|(_, s)| format!("  {}: {} ({})", s.index, s.name, s.backend)).collect();
-        if names.is_empty() { "there is no adapter".into() } else { names.join("\n") }
+        let names: Vec<String> = adapters
+            .iter()
+            .map(|(_, s)| format!("  {}: {} ({})", s.index, s.name, s.backend))
+            .collect();
+        if names.is_empty() {
+            "there is no adapter".into()
+        } else {
+            names.join("\n")
+        }
     };
     let (adapter, summary) = match choice {
         DeviceChoice::Best => adapters
@@ -169,18 +195,27 @@ pub fn open(choice: &DeviceChoice) -> Result<Gpu> {
             .min_by_key(|(_, s)| preference(s))
             .ok_or_else(|| Error::Device(format!("no usable GPU adapter; {DRIVER_ADVICE}")))?,
         DeviceChoice::Index(index) => adapters.get(*index).ok_or_else(|| {
-            Error::Device(format!("there is no device {index}; the devices are\n{}", known()))
+            Error::Device(format!(
+                "there is no device {index}; the devices are\n{}",
+                known()
+            ))
         })?,
         DeviceChoice::Name(name) => adapters
             .iter()
             .filter(|(_, s)| s.is_called(name))
             .min_by_key(|(_, s)| preference(s))
             .ok_or_else(|| {
-                Error::Device(format!("no device is called '{name}'; the devices are\n{}", known()))
+                Error::Device(format!(
+                    "no device is called '{name}'; the devices are\n{}",
+                    known()
+                ))
             })?,
     };
     if let Some(why) = &summary.unusable {
-        return Err(Error::Device(format!("device {} ({}) has {why}", summary.index, summary.name)));
+        return Err(Error::Device(format!(
+            "device {} ({}) has {why}",
+            summary.index, summary.name
+        )));
     }
     let faults = Arc::new(Mutex::new(Vec::new()));
     let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
@@ -188,30 +223,49 @@ pub fn open(choice: &DeviceChoice) -> Result<Gpu> {
         required_limits: summary.limits.clone(),
         ..Default::default()
     }))
-    .map_err(|e| Error::Device(format!("device {} ({}) does not open: {e}", summary.index, summary.name)))?;
+    .map_err(|e| {
+        Error::Device(format!(
+            "device {} ({}) does not open: {e}",
+            summary.index, summary.name
+        ))
+    })?;
     let sink = Arc::clone(&faults);
     device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
         let text = match error {
             wgpu::Error::OutOfMemory { .. } => "the device is out of memory".to_owned(),
             other => format!("the device reports: {other}"),
         };
-        sink.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push(text);
+        sink.lock()
+            .unwrap_or_else(std::sync::PoisonError::into_inner)
+            .push(text);
     }));
     let sink = Arc::clone(&faults);
     device.set_device_lost_callback(move |reason, message| {
         if reason != wgpu::DeviceLostReason::Destroyed {
             let text = format!("the device is lost: {message}");
-            sink.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push(text);
+            sink.lock()
+                .unwrap_or_else(std::sync::PoisonError::into_inner)
+                .push(text);
         }
     });
-    Ok(Gpu { device, queue, limits: summary.limits.clone(), summary: summary.clone(), faults })
+    Ok(Gpu {
+        device,
+        queue,
+        limits: summary.limits.clone(),
+        summary: summary.clone(),
+        faults,
+    })
 }
 
 /// Real GPUs first; of the same kind, the more direct interface first.
 fn preference(summary: &AdapterSummary) -> (usize, usize, usize) {
-    let place = |order: &[&str], of: &str| order.iter().position(|k| *k == of).unwrap_or(order.len());
+    let place =
+        |order: &[&str], of: &str| order.iter().position(|k| *k == of).unwrap_or(order.len());
     (
-        place(&["discrete", "integrated", "virtual", "other", "software"], summary.kind),
+        place(
+            &["discrete", "integrated", "virtual", "other", "software"],
+            summary.kind,
+        ),
         place(&["vulkan", "metal", "dx12", "gl"], &summary.backend),
         summary.index,
     )
@@ -223,11 +277,18 @@ impl Gpu {
     /// # Errors
     /// [`Error::Gpu`] with all that it reported.
     pub fn check(&self) -> Result<()> {
-        let faults = self.faults.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let faults = self
+            .faults
+            .lock()
+            .unwrap_or_else(std::sync::PoisonError::into_inner);
         if faults.is_empty() {
             return Ok(());
         }
-        Err(Error::Gpu(format!("{}: {}", self.summary.name, faults.join("; "))))
+        Err(Error::Gpu(format!(
+            "{}: {}",
+            self.summary.name,
+            faults.join("; ")
+        )))
     }
 
     /// Waits until the queue is empty.
@@ -237,6 +298,8 @@ impl Gpu {
     pub fn wait(&self) -> Result<()> {
         let waited = self.device.poll(wgpu::PollType::wait_indefinitely());
         self.check()?;
-        waited.map(|_| ()).map_err(|e| Error::Gpu(format!("{}: {e}", self.summary.name)))
+        waited
+            .map(|_| ())
+            .map_err(|e| Error::Gpu(format!("{}: {e}", self.summary.name)))
     }
 }

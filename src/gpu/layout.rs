@@ -25,7 +25,10 @@ impl SphereRecord {
     /// The record of a sphere without a pole frame.
     #[must_use]
     pub fn new(sphere: &PlacedSphere) -> Self {
-        Self { center: sphere.anchor.as_vec3().to_array(), radius: sphere.radius as f32 }
+        Self {
+            center: sphere.anchor.as_vec3().to_array(),
+            radius: sphere.radius as f32,
+        }
     }
 }
 
@@ -184,7 +187,12 @@ impl MaterialRecord {
                 record.kind = 2;
                 record.ior = ior as f32;
             }
-            MaterialKind::Reflective { albedo, specular, epsilon, mu } => {
+            MaterialKind::Reflective {
+                albedo,
+                specular,
+                epsilon,
+                mu,
+            } => {
                 record.kind = 3;
                 record.color = vector(albedo);
                 record.specular = vector(specular);

@@ -52,40 +52,51 @@ impl Probe {
     ///
     /// # Errors
     /// [`Error::Shader`] if they do not link, [`Error::Gpu`] if the device refuses them.
-    pub fn new(
-        gpu: &Gpu,
-        scene: &Scene,
-        placement: &Placement,
-        effects: &Effects,
-    ) -> Result<Self> {
+    pub fn new(gpu: &Gpu, scene: &Scene, placement: &Placement, effects: &Effects) -> Result<Self> {
         let kernel = link(Stage::Probe, scene, placement, effects)?;
-        let module = gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor {
-            label: Some("probe"),
-            source: wgpu::ShaderSource::Wgsl(kernel.wgsl.as_str().into()),
-        });
+        let module = gpu
+            .device
+            .create_shader_module(wgpu::ShaderModuleDescriptor {
+                label: Some("probe"),
+                source: wgpu::ShaderSource::Wgsl(kernel.wgsl.as_str().into()),
+            });
         let entry = |binding, ty| wgpu::BindGroupLayoutEntry {
             binding,
             visibility: wgpu::ShaderStages::COMPUTE,
-            ty: wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None },
+            ty: wgpu::BindingType::Buffer {
+                ty,
+                has_dynamic_offset: false,
+                min_binding_size: None,
+            },
             count: None,
         };
         // The same for all functions: a layout may have more than an entry point uses.
-        let layout = gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label: Some("probe"),
-            entries: &[
-                entry(4, wgpu::BufferBindingType::Uniform),
-                entry(11, wgpu::BufferBindingType::Storage { read_only: true }),
-                entry(12, wgpu::BufferBindingType::Storage { read_only: false }),
-                entry(13, wgpu::BufferBindingType::Uniform),
-            ],
-        });
-        let camera = gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-            label: Some("camera"),
-            contents: bytemuck::bytes_of(&CameraRecord::new(&placement.camera)),
-            usage: wgpu::BufferUsages::UNIFORM,
-        });
+        let layout = gpu
+            .device
+            .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+                label: Some("probe"),
+                entries: &[
+                    entry(4, wgpu::BufferBindingType::Uniform),
+                    entry(11, wgpu::BufferBindingType::Storage { read_only: true }),
+                    entry(12, wgpu::BufferBindingType::Storage { read_only: false }),
+                    entry(13, wgpu::BufferBindingType::Uniform),
+                ],
+            });
+        let camera = gpu
+            .device
+            .create_buffer_init(&wgpu::util::BufferInitDescriptor {
+                label: Some("camera"),
+                contents: bytemuck::bytes_of(&CameraRecord::new(&placement.camera)),
+                usage: wgpu::BufferUsages::UNIFORM,
+            });
         gpu.check()?;
-        Ok(Self { gpu: gpu.clone(), kernel, module, layout, camera })
+        Ok(Self {
+            gpu: gpu.clone(),
+            kernel,
+            module,
+            layout,
+            camera,
+        })
     }
 
     /// The kernel in use.
@@ -102,11 +113,27 @@ impl Probe {
     /// # Panics
     /// If an input or an output is not a whole number of rows.
     pub fn call<I: Pod, O: Pod>(&self, function: &str, inputs: &[I]) -> Result<Vec<O>> {
-        assert_eq!(size_of::<I>() % ROW, 0, "inputs of {function} are not whole rows");
-        assert_eq!(size_of::<O>() % ROW, 0, "outputs of {function} are not whole rows");
+        assert_eq!(
+            size_of::<I>() % ROW,
+            0,
+            "inputs of {function} are not whole rows"
+        );
+        assert_eq!(
+            size_of::<O>() % ROW,
+            0,
+            "outputs of {function} are not whole rows"
+        );
         let entry = format!("probe_{function}");
-        if !self.kernel.module.entry_points.iter().any(|e| e.name == entry) {
-            return Err(Error::Shader(format!("the kernel has no function {function}")));
+        if !self
+            .kernel
+            .module
+            .entry_points
+            .iter()
+            .any(|e| e.name == entry)
+        {
+            return Err(Error::Shader(format!(
+                "the kernel has no function {function}"
+            )));
         }
         let device = &self.gpu.device;
         let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
@@ -150,9 +177,16 @@ impl Probe {
                 usage,
             })
         };
-        let shape = upload("shape", bytemuck::bytes_of(&shape), wgpu::BufferUsages::UNIFORM);
-        let input =
-            upload("inputs", bytemuck::cast_slice(inputs), wgpu::BufferUsages::STORAGE);
+        let shape = upload(
+            "shape",
+            bytemuck::bytes_of(&shape),
+            wgpu::BufferUsages::UNIFORM,
+        );
+        let input = upload(
+            "inputs",
+            bytemuck::cast_slice(inputs),
+            wgpu::BufferUsages::STORAGE,
+        );
         let size = size_of_val(inputs) / size_of::<I>() * size_of::<O>();
         let buffer = |label, usage| {
             device.create_buffer(&wgpu::BufferDescriptor {
@@ -162,9 +196,14 @@ impl Probe {
                 mapped_at_creation: false,
             })
         };
-        let output =
-            buffer("outputs", wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC);
-        let staging = buffer("staging", wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ);
+        let output = buffer(
+            "outputs",
+            wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC,
+        );
+        let staging = buffer(
+            "staging",
+            wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
+        );
         let bind_group = device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("probe"),
             layout: &self.layout,
@@ -190,7 +229,11 @@ impl Probe {
         let bytes = staging.get_mapped_range(..).map_err(|e| {
             Error::Gpu(format!("{}: no data came back: {e}", self.gpu.summary.name))
         })?;
-        outputs.extend(bytes.chunks_exact(size_of::<O>()).map(bytemuck::pod_read_unaligned::<O>));
+        outputs.extend(
+            bytes
+                .chunks_exact(size_of::<O>())
+                .map(bytemuck::pod_read_unaligned::<O>),
+        );
         Ok(())
     }
 }

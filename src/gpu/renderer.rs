@@ -69,7 +69,10 @@ impl GpuRenderer {
         let kernel = link(Stage::Path, scene, placement, effects)?;
         let device = &gpu.device;
         let side = REGION.min(gpu.limits.max_texture_dimension_2d);
-        let (width, height) = (settings.crop.width.min(side), settings.crop.height.min(side));
+        let (width, height) = (
+            settings.crop.width.min(side),
+            settings.crop.height.min(side),
+        );
         let (_, partial_size) = kernel
             .struct_members("Partial")
             .ok_or_else(|| Error::Shader("the kernel has no struct Partial".into()))?;
@@ -81,7 +84,10 @@ impl GpuRenderer {
                 usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
             })
         };
-        let camera = uniform("camera", bytemuck::bytes_of(&CameraRecord::new(&placement.camera)));
+        let camera = uniform(
+            "camera",
+            bytemuck::bytes_of(&CameraRecord::new(&placement.camera)),
+        );
         let work = uniform("work", bytemuck::bytes_of(&DispatchRecord::zeroed()));
         let buffer = |label, size: u64, usage| {
             device.create_buffer(&wgpu::BufferDescriptor {
@@ -99,10 +105,16 @@ impl GpuRenderer {
         let counter_usage = wgpu::BufferUsages::STORAGE
             | wgpu::BufferUsages::COPY_SRC
             | wgpu::BufferUsages::COPY_DST;
-        let counters = buffer("counters", size_of::<CountersRecord>() as u64, counter_usage);
+        let counters = buffer(
+            "counters",
+            size_of::<CountersRecord>() as u64,
+            counter_usage,
+        );
         let region = RegionTargets::new(device, width, height);
-        let views =
-            region.textures.each_ref().map(|t| t.create_view(&wgpu::TextureViewDescriptor::default()));
+        let views = region
+            .textures
+            .each_ref()
+            .map(|t| t.create_view(&wgpu::TextureViewDescriptor::default()));
 
         let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some("path"),
@@ -130,9 +142,15 @@ impl GpuRenderer {
             (6, partials.as_entire_binding()),
             (7, counters.as_entire_binding()),
         ];
-        entries.extend(uploaded.iter().map(|(binding, b)| (*binding, b.as_entire_binding())));
         entries.extend(
-            (8..).zip(&views).map(|(i, view)| (i, wgpu::BindingResource::TextureView(view))),
+            uploaded
+                .iter()
+                .map(|(binding, b)| (*binding, b.as_entire_binding())),
+        );
+        entries.extend(
+            (8..)
+                .zip(&views)
+                .map(|(i, view)| (i, wgpu::BindingResource::TextureView(view))),
         );
         let entries: Vec<wgpu::BindGroupEntry<'_>> = entries
             .into_iter()
@@ -170,7 +188,9 @@ impl GpuRenderer {
     }
 
     fn dispatch(&mut self, record: &DispatchRecord, tiles: u32) -> Result<()> {
-        self.gpu.queue.write_buffer(&self.work, 0, bytemuck::bytes_of(record));
+        self.gpu
+            .queue
+            .write_buffer(&self.work, 0, bytemuck::bytes_of(record));
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
         {
             let mut pass = encoder.begin_compute_pass(&Default::default());
@@ -233,10 +253,14 @@ impl GpuRenderer {
         let left = samples.end - samples.start;
         let fit = self.rate * SLAB.as_secs_f64() / pixels;
         let busy = self.rate * DISPATCH.as_secs_f64() / f64::from(BUSY_TILES * TILE * TILE);
-        let parts = (left as f64 / fit.min(busy.max(BLOCK as f64))).ceil().max(1.0);
+        let parts = (left as f64 / fit.min(busy.max(BLOCK as f64)))
+            .ceil()
+            .max(1.0);
         let length = (left as f64 / parts).ceil() as u64;
         // Slabs end where blocks do.
-        (samples.start + length).next_multiple_of(BLOCK).min(samples.end)
+        (samples.start + length)
+            .next_multiple_of(BLOCK)
+            .min(samples.end)
     }
 
     fn tile_count(&self, samples: u64) -> u32 {
@@ -280,8 +304,16 @@ impl GpuRenderer {
         let mut pixels = vec![PixelSums::default(); region.pixels()];
         let mut tally = Tally::default();
         {
-            let [high, low, deviation] = self.region.staging.each_ref().map(|b| b.get_mapped_range(..));
-            let (high, low, deviation) = (high.map_err(lost)?, low.map_err(lost)?, deviation.map_err(lost)?);
+            let [high, low, deviation] = self
+                .region
+                .staging
+                .each_ref()
+                .map(|b| b.get_mapped_range(..));
+            let (high, low, deviation) = (
+                high.map_err(lost)?,
+                low.map_err(lost)?,
+                deviation.map_err(lost)?,
+            );
             for y in 0..region.height {
                 let row = (y * stride) as usize..;
                 let row = |bytes: &wgpu::BufferView| -> Vec<[f32; 4]> {
@@ -305,7 +337,10 @@ impl GpuRenderer {
                 let number = u32::MAX - counters.first_pixel;
                 tally.non_finite = u64::from(counters.non_finite);
                 tally.first_non_finite = Some(NonFinite {
-                    pixel: [region.x + number % region.width, region.y + number / region.width],
+                    pixel: [
+                        region.x + number % region.width,
+                        region.y + number / region.width,
+                    ],
                     sample: (samples.start >> 32 << 32) + u64::from(counters.sample_low),
                     bounce: counters.bounce,
                 });
@@ -354,7 +389,11 @@ impl RegionTargets {
         let texture = |label| {
             device.create_texture(&wgpu::TextureDescriptor {
                 label: Some(label),
-                size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+                size: wgpu::Extent3d {
+                    width,
+                    height,
+                    depth_or_array_layers: 1,
+                },
                 mip_level_count: 1,
                 sample_count: 1,
                 dimension: wgpu::TextureDimension::D2,
@@ -396,8 +435,10 @@ impl Uploads {
         }
         let (poles, centered) = placement.spheres.split_at(placement.poles);
         let spheres: Vec<SphereRecord> = centered.iter().map(SphereRecord::new).collect();
-        let poles: Vec<PoleRecord> =
-            poles.iter().filter_map(|s| Some(PoleRecord::new(s, s.pole?))).collect();
+        let poles: Vec<PoleRecord> = poles
+            .iter()
+            .filter_map(|s| Some(PoleRecord::new(s, s.pole?)))
+            .collect();
         let mut attributes: Vec<u32> = Vec::new();
         for sphere in &placement.spheres {
             attributes.push(sphere.material as u32);
@@ -423,8 +464,13 @@ impl Uploads {
     }
 
     fn check(&self, limits: &wgpu::Limits, partials: u64) -> Result<()> {
-        let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-        let sizes = self.0.iter().map(|(_, name, bytes)| (*name, bytes.len() as u64));
+        let most = limits
+            .max_storage_buffer_binding_size
+            .min(limits.max_buffer_size);
+        let sizes = self
+            .0
+            .iter()
+            .map(|(_, name, bytes)| (*name, bytes.len() as u64));
         for (name, size) in sizes.chain([("partial sums", partials)]) {
             if size > most {
                 return Err(Error::Gpu(format!(

@@ -7,6 +7,7 @@ use serde::Serialize;
 
 use super::{Metadata, atomic};
 use crate::error::{Error, Result};
+pub use crate::render::StoppedBy;
 
 /// All that is known of a finished render. The names are those of the JSON, which users' scripts
 /// rely on: add members, but rename and remove none.
@@ -100,20 +101,6 @@ pub struct BounceLimit {
     /// A bound on the share of the image's energy that they could have brought, a fraction; `null`
     /// where no bound is known.
     pub energy_at_most: Option<f64>,
-}
-
-/// What ended a render: whichever came first.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum StoppedBy {
-    /// All samples were taken.
-    Spp,
-    /// The error fell to what was asked for.
-    Error,
-    /// The time was up.
-    Time,
-    /// The user or the system said so.
-    Interrupt,
 }
 
 impl Stats {

@@ -46,7 +46,11 @@ impl PathTracer<'_> {
     /// Traces sample `sample` of `pixel`.
     #[must_use]
     pub fn trace(&self, pixel: [u32; 2], sample: u64) -> PathResult {
-        let Self { scene, placement, settings } = self;
+        let Self {
+            scene,
+            placement,
+            settings,
+        } = self;
         let stream = stream_words(settings.seed, (sample >> 32) as u32);
         let random = |dimension| random4(stream, pixel, sample as u32, dimension);
         let lecture = matches!(settings.integrator, Integrator::Lecture { .. });
@@ -69,7 +73,14 @@ impl PathTracer<'_> {
             }
             let u = random(result.bounces + 1);
             let vertex = vertex_at(&ray, &hit, sphere);
-            let s = scatter(&material.kind, vertex.normal, ray.direction, hit.inside, u, lecture);
+            let s = scatter(
+                &material.kind,
+                vertex.normal,
+                ray.direction,
+                hit.inside,
+                u,
+                lecture,
+            );
             throughput *= s.weight;
             compression *= s.compression;
             let largest = (throughput * compression).max_element();
@@ -127,8 +138,11 @@ impl ReferenceRenderer {
     }
 
     fn pixel(&self, pixel: [u32; 2], samples: &Range<u64>, state: &mut PixelState) {
-        let tracer =
-            PathTracer { scene: &self.scene, placement: &self.placement, settings: &self.settings };
+        let tracer = PathTracer {
+            scene: &self.scene,
+            placement: &self.placement,
+            settings: &self.settings,
+        };
         for sample in samples.clone() {
             let path = tracer.trace(pixel, sample);
             state.add(pixel, sample, &path);
@@ -158,7 +172,11 @@ impl PixelState {
             self.block += path.radiance;
         } else {
             self.tally.non_finite += 1;
-            let place = NonFinite { pixel, sample, bounce: path.bounces };
+            let place = NonFinite {
+                pixel,
+                sample,
+                bounce: path.bounces,
+            };
             self.tally.first_non_finite = self.tally.first_non_finite.or(Some(place));
         }
         self.in_block += 1;
@@ -185,7 +203,11 @@ impl PixelState {
 impl Renderer for ReferenceRenderer {
     fn device(&self) -> (String, String, String) {
         let threads = self.threads.current_num_threads();
-        (format!("CPU reference, f64, {threads} threads"), "cpu".into(), "none".into())
+        (
+            format!("CPU reference, f64, {threads} threads"),
+            "cpu".into(),
+            "none".into(),
+        )
     }
 
     fn render(&mut self, samples: Range<u64>, control: &mut dyn Control) -> Result<Window> {
@@ -197,12 +219,15 @@ impl Renderer for ReferenceRenderer {
             // A block at a time over the whole image: then it can stop.
             let end = (start / BLOCK * BLOCK + BLOCK).min(samples.end);
             self.threads.install(|| {
-                state.par_chunks_mut(width).enumerate().for_each(|(y, row)| {
-                    for (x, state) in row.iter_mut().enumerate() {
-                        let pixel = [crop.x + x as u32, crop.y + y as u32];
-                        self.pixel(pixel, &(start..end), state);
-                    }
-                });
+                state
+                    .par_chunks_mut(width)
+                    .enumerate()
+                    .for_each(|(y, row)| {
+                        for (x, state) in row.iter_mut().enumerate() {
+                            let pixel = [crop.x + x as u32, crop.y + y as u32];
+                            self.pixel(pixel, &(start..end), state);
+                        }
+                    });
             });
             let paths = crop.pixels() as u64 * (end - start);
             start = end;

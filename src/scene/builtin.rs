@@ -87,3 +87,41 @@ pub fn resolve(argument: Option<&str>) -> Result<Loaded> {
         word.escape_debug()
     )))
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::super::{Handedness, MaterialKind};
+    use super::*;
+
+    #[test]
+    fn the_default_scene_is_the_lecture() {
+        let scene = resolve(None).expect("lecture").scene;
+        assert_eq!(scene.spheres.len(), 7);
+        assert_eq!(scene.camera.handedness, Handedness::Left);
+        let cyan = scene
+            .materials
+            .iter()
+            .find(|m| m.name == "cyan")
+            .expect("cyan");
+        let albedo = DVec3::new(0.878, 1.0, 1.0);
+        assert_eq!(cyan.kind, MaterialKind::Diffuse { albedo });
+        assert_eq!(scene.spheres[4].center.y, 1001.0);
+    }
+
+    #[test]
+    fn words_are_files_or_built_in_scenes() {
+        let error = resolve(Some("lecure")).expect_err("neither");
+        assert!(matches!(error, Error::Usage(_)), "{error:?}");
+        let text = error.to_string();
+        assert!(
+            text.contains("did you mean `lecture`?") && text.contains("field"),
+            "{text}"
+        );
+        for file in ["./lecture", "lecture.toml", "scenes/none"] {
+            let error = resolve(Some(file)).expect_err("no such file");
+            assert!(matches!(error, Error::File { .. }), "{file}: {error:?}");
+        }
+    }
+}

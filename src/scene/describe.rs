@@ -43,10 +43,10 @@ fn write(text: &mut String, loaded: &Loaded) -> fmt::Result {
         scene.width, scene.height
     )?;
     if let Some(spp) = scene.render.spp {
-        write!(text, ", {spp} samples a pixel")?;
+        write!(text, ", {} a pixel", counted(spp, "sample"))?;
     }
     if let Some(bounces) = scene.render.max_bounces {
-        write!(text, ", at most {bounces} bounces")?;
+        write!(text, ", at most {}", counted(bounces, "bounce"))?;
     }
     writeln!(text)?;
     camera(text, scene)?;
@@ -139,7 +139,7 @@ fn triple(vector: DVec3) -> String {
     format!("({}, {}, {})", vector.x, vector.y, vector.z)
 }
 
-fn counted(count: usize, noun: &str) -> String {
-    let plural = if count == 1 { "" } else { "s" };
+fn counted<N: fmt::Display + PartialEq + From<u8>>(count: N, noun: &str) -> String {
+    let plural = if count == N::from(1) { "" } else { "s" };
     format!("{count} {noun}{plural}")
 }

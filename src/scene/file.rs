@@ -251,3 +251,42 @@ pub fn json_schema() -> serde_json::Value {
         .into_root_schema_for::<SceneFile>()
         .to_value()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_published_schema_describes_every_key() {
+        fn walk(path: &str, schema: &serde_json::Value) {
+            for (key, value) in schema["properties"].as_object().into_iter().flatten() {
+                let path = format!("{path}.{key}");
+                let described = value["description"].as_str().is_some_and(|d| !d.is_empty());
+                assert!(
+                    described || value["const"].is_string(),
+                    "{path} has no description"
+                );
+                assert!(
+                    value
+                        .get("default")
+                        .is_none_or(|default| !default.is_null()),
+                    "{path}"
+                );
+                walk(&path, value);
+                walk(&path, &value["items"]);
+                for variant in value["additionalProperties"]["oneOf"]
+                    .as_array()
+                    .into_iter()
+                    .flatten()
+                {
+                    walk(&path, variant);
+                }
+            }
+            assert!(schema["properties"].is_null() || schema["additionalProperties"] == false);
+        }
+        let schema = json_schema();
+        walk("", &schema);
+        let fov = &schema["properties"]["camera"]["properties"]["fov"];
+        assert_eq!(fov["exclusiveMaximum"], 180.0);
+    }
+}

@@ -96,11 +96,94 @@ impl Fnv {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::load::load_str;
+
+    const TEXT: &str = r#"
+        camera = { position = [0, 0, -4], look_at = [0, 0, 6], fov = 36, aperture_radius = 0.1, focus_distance = 4 }
+        image = { width = 64, height = 48 }
+        render = { spp = 16, max_bounces = 8 }
+        environment = { radiance = [0.7, 0.8, 1] }
+        material.glass = { type = "dielectric", ior = 1.5 }
+        material.matte = { type = "diffuse", albedo = [0.1, 0.2, 0.3] }
+        material.shiny = { type = "reflective", albedo = [0.1, 0.2, 0.3], specular = [1, 1, 1], epsilon = 0.01, mu = 9 }
+        material.chrome = { type = "mirror", reflectance = [0.1, 0.2, 0.3] }
+        sphere = [
+            { center = [0, 0, 0], radius = 1, material = "glass", priority = 0 },
+            { center = [3, 0, 0], radius = 1, material = "matte" },
+            { center = [6, 0, 0], radius = 1, material = "shiny" },
+            { center = [9, 0, 0], radius = 1, material = "chrome" },
+        ]
+    "#;
+
+    fn scene() -> Scene {
+        load_str("scene", TEXT).expect("good").scene
+    }
 
     #[test]
     fn fnv_has_its_published_values() {
         let mut hash = Fnv::new();
         hash.bytes(b"foobar");
         assert_eq!(hash.0, 0x8594_4171_f739_67e8);
+    }
+
+    #[test]
+    fn every_value_of_the_image_changes_the_hash() {
+        let change = |kind: &mut MaterialKind| match kind {
+            MaterialKind::Diffuse { albedo } => albedo.z += 0.1,
+            MaterialKind::Mirror { reflectance } => reflectance.x += 0.1,
+            MaterialKind::Dielectric { ior } => *ior += 1e-9,
+            MaterialKind::Reflective { mu, .. } => *mu += 1.0,
+        };
+        let changes: [fn(&mut Scene); 14] = [
+            |scene| scene.camera.position.x = 1e-300,
+            |scene| scene.camera.look_at.y = 1.0,
+            |scene| scene.camera.up.z = 1.0,
+            |scene| scene.camera.fov = 36.000_000_000_000_01,
+            |scene| scene.camera.handedness = Handedness::Left,
+            |scene| scene.camera.aperture_radius = 0.2,
+            |scene| scene.camera.focus_distance = 5.0,
+            |scene| std::mem::swap(&mut scene.width, &mut scene.height),
+            |scene| scene.environment = None,
+            |scene| scene.spheres[0].center.x = 1.0,
+            |scene| scene.spheres[1].radius = 2.0,
+            |scene| scene.spheres[0].priority = None,
+            |scene| scene.materials[3].emission.y = 1.0,
+            |scene| scene.spheres.swap(0, 1),
+        ];
+        let mut hashes = vec![content_hash(&scene())];
+        for alter in changes {
+            let mut scene = scene();
+            alter(&mut scene);
+            hashes.push(content_hash(&scene));
+        }
+        for index in 0..4 {
+            let mut scene = scene();
+            change(&mut scene.materials[index].kind);
+            hashes.push(content_hash(&scene));
+        }
+        let count = hashes.len();
+        hashes.sort();
+        hashes.dedup();
+        assert_eq!(hashes.len(), count);
+        assert!(hashes.iter().all(|hash| hash.len() == 16), "{hashes:?}");
+    }
+
+    #[test]
+    fn what_the_image_does_not_depend_on_does_not_count() {
+        let mut other = scene();
+        other.render.spp = None;
+        other.camera.position.x = -0.0;
+        other.materials.reverse();
+        for sphere in &mut other.spheres {
+            sphere.material = 3 - sphere.material;
+        }
+        other.materials[0].name = "other".to_owned();
+        other.materials.push(other.materials[0].clone());
+        assert_eq!(content_hash(&other), content_hash(&scene()));
+        let [mut near, mut far] = [scene(), scene()];
+        near.camera.aperture_radius = 0.0;
+        far.camera.aperture_radius = 0.0;
+        far.camera.focus_distance = 9.0;
+        assert_eq!(content_hash(&near), content_hash(&far), "a pinhole");
     }
 }

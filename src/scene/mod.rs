@@ -9,6 +9,8 @@ mod describe;
 mod file;
 mod hash;
 pub mod load;
+#[cfg(test)]
+mod properties;
 mod range;
 mod report;
 mod shape;

@@ -56,7 +56,10 @@ fn closest_hit(text: &mut String, placement: &Placement, effects: &Effects) {
                 vector(normal),
                 number(1.0 / sphere.radius)
             ),
-            None => format!("sphere_quadratic(x, ray.direction, dd, {})", number(sphere.radius)),
+            None => format!(
+                "sphere_quadratic(x, ray.direction, dd, {})",
+                number(sphere.radius)
+            ),
         };
         let root = if sphere.side == Side::Outside {
             format!("let t = root_outside(q.b, q.square, q.c, ray.own == {i}u);")
@@ -75,7 +78,11 @@ fn closest_hit(text: &mut String, placement: &Placement, effects: &Effects) {
             vector(sphere.anchor),
         );
         if interior {
-            let inside = if sphere.side == Side::Outside { "false" } else { "root.inside" };
+            let inside = if sphere.side == Side::Outside {
+                "false"
+            } else {
+                "root.inside"
+            };
             let _ = writeln!(text, "hit.inside = select(hit.inside, {inside}, closer);");
         }
         *text += "}\n";
@@ -99,7 +106,11 @@ fn choose(text: &mut String, target: &str, values: &[String]) {
             let _ = writeln!(text, "{target} = {value};");
         } else {
             let is: Vec<String> = indices.iter().map(|i| format!("index == {i}u")).collect();
-            let _ = writeln!(text, "{target} = select({target}, {value}, {});", is.join(" || "));
+            let _ = writeln!(
+                text,
+                "{target} = select({target}, {value}, {});",
+                is.join(" || ")
+            );
         }
     }
 }
@@ -112,7 +123,11 @@ fn frame_of(text: &mut String, placement: &Placement, effects: &Effects) {
     choose(text, "frame.anchor", &each(&|s| vector(s.anchor)));
     choose(text, "frame.curvature", &each(&|s| number(1.0 / s.radius)));
     if effects.has("pole") {
-        choose(text, "frame.pole", &each(&|s| vector(s.pole.unwrap_or_default())));
+        choose(
+            text,
+            "frame.pole",
+            &each(&|s| vector(s.pole.unwrap_or_default())),
+        );
     }
     choose(
         text,

@@ -26,7 +26,9 @@ impl Kernel {
     #[must_use]
     pub fn has_binding(&self, binding: u32) -> bool {
         self.module.global_variables.iter().any(|(_, variable)| {
-            variable.binding.is_some_and(|b| b.group == 0 && b.binding == binding)
+            variable
+                .binding
+                .is_some_and(|b| b.group == 0 && b.binding == binding)
         })
     }
 
@@ -34,18 +36,21 @@ impl Kernel {
     /// named it: the end of the name is enough), and the struct's own size.
     #[must_use]
     pub fn struct_members(&self, name: &str) -> Option<(Vec<(String, u32)>, u32)> {
-        self.module.types.iter().find_map(|(_, ty)| match (&ty.name, &ty.inner) {
-            (Some(n), naga::TypeInner::Struct { members, span })
-                if n == name || n.ends_with(&format!("_{name}")) =>
-            {
-                let members = members
-                    .iter()
-                    .map(|m| (m.name.clone().unwrap_or_default(), m.offset))
-                    .collect();
-                Some((members, *span))
-            }
-            _ => None,
-        })
+        self.module
+            .types
+            .iter()
+            .find_map(|(_, ty)| match (&ty.name, &ty.inner) {
+                (Some(n), naga::TypeInner::Struct { members, span })
+                    if n == name || n.ends_with(&format!("_{name}")) =>
+                {
+                    let members = members
+                        .iter()
+                        .map(|m| (m.name.clone().unwrap_or_default(), m.offset))
+                        .collect();
+                    Some((members, *span))
+                }
+                _ => None,
+            })
     }
 }
 
@@ -72,7 +77,10 @@ pub fn link(
     for (path, text) in sources::ALL {
         resolver.add_module(module_path(path), (*text).into());
     }
-    resolver.add_module(module_path("config"), config(scene, placement, effects).into());
+    resolver.add_module(
+        module_path("config"),
+        config(scene, placement, effects).into(),
+    );
     if effects.has("baked") {
         let text = baked::geometry(scene, placement, effects);
         resolver.add_module(module_path("scene/baked"), text.into());
@@ -104,19 +112,30 @@ pub fn link(
 /// # Errors
 /// [`Error::Shader`] with the place in the source.
 pub fn validate(wgsl: &str) -> Result<naga::Module> {
-    let module = naga::front::wgsl::parse_str(wgsl)
-        .map_err(|e| Error::Shader(format!("the kernel is not WGSL: {}", e.emit_to_string(wgsl))))?;
+    let module = naga::front::wgsl::parse_str(wgsl).map_err(|e| {
+        Error::Shader(format!(
+            "the kernel is not WGSL: {}",
+            e.emit_to_string(wgsl)
+        ))
+    })?;
     naga::valid::Validator::new(
         naga::valid::ValidationFlags::all(),
         naga::valid::Capabilities::empty(),
     )
     .validate(&module)
-    .map_err(|e| Error::Shader(format!("the kernel is not valid: {}", e.emit_to_string(wgsl))))?;
+    .map_err(|e| {
+        Error::Shader(format!(
+            "the kernel is not valid: {}",
+            e.emit_to_string(wgsl)
+        ))
+    })?;
     Ok(module)
 }
 
 fn module_path(path: &str) -> ModulePath {
-    format!("package::{}", path.replace('/', "::")).parse().expect("a literal path of this crate")
+    format!("package::{}", path.replace('/', "::"))
+        .parse()
+        .expect("a literal path of this crate")
 }
 
 /// The module `config`: sizes and constants of this scene.

@@ -16,5 +16,8 @@ pub fn sample_diffuse(albedo: DVec3, normal: DVec3, u: [f64; 4]) -> BsdfSample {
 pub fn sample_diffuse_uniform(albedo: DVec3, normal: DVec3, u: [f64; 4]) -> BsdfSample {
     let w = sphere_direction(DVec2::new(u[0], u[1]));
     let cosine = w.dot(normal);
-    bsdf_sample(if cosine < 0.0 { -w } else { w }, 2.0 * cosine.abs() * albedo)
+    bsdf_sample(
+        if cosine < 0.0 { -w } else { w },
+        2.0 * cosine.abs() * albedo,
+    )
 }

@@ -33,7 +33,12 @@ pub fn in_lobe(material: &Reflective, w: DVec3, d_r: DVec3) -> bool {
 /// The BRDF, in the lobe or out of it.
 #[must_use]
 pub fn eval_reflective(material: &Reflective, lobe: bool) -> DVec3 {
-    material.color / PI + if lobe { material.mu * material.specular } else { DVec3::ZERO }
+    material.color / PI
+        + if lobe {
+            material.mu * material.specular
+        } else {
+            DVec3::ZERO
+        }
 }
 
 /// Probability of the lobe: its share of the reflected light, by luminance.
@@ -48,7 +53,11 @@ pub fn lobe_probability(material: &Reflective, cos_o: f64) -> f64 {
 /// pdf in solid angle of the direction w, which makes the cosine `cosine` with the normal.
 #[must_use]
 pub fn pdf_reflective(material: &Reflective, q: f64, cosine: f64, lobe: bool) -> f64 {
-    let cap = if lobe { q / (2.0 * PI * material.epsilon) } else { 0.0 };
+    let cap = if lobe {
+        q / (2.0 * PI * material.epsilon)
+    } else {
+        0.0
+    };
     cap + (1.0 - q) * cosine.max(0.0) / PI
 }
 

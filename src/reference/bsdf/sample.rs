@@ -18,5 +18,10 @@ pub struct BsdfSample {
 /// A sample that stays on its side.
 #[must_use]
 pub fn bsdf_sample(direction: DVec3, weight: DVec3) -> BsdfSample {
-    BsdfSample { direction, weight, crossed: false, compression: 1.0 }
+    BsdfSample {
+        direction,
+        weight,
+        crossed: false,
+        compression: 1.0,
+    }
 }

@@ -27,8 +27,18 @@ pub fn scatter(
         MaterialKind::Dielectric { ior } => {
             sample_dielectric(if inside { 1.0 / ior } else { ior }, normal, arrival, u)
         }
-        MaterialKind::Reflective { albedo, specular, epsilon, mu } => {
-            let material = Reflective { color: albedo, specular, epsilon, mu };
+        MaterialKind::Reflective {
+            albedo,
+            specular,
+            epsilon,
+            mu,
+        } => {
+            let material = Reflective {
+                color: albedo,
+                specular,
+                epsilon,
+                mu,
+            };
             if uniform {
                 sample_reflective_uniform(&material, normal, arrival, u)
             } else {

@@ -27,5 +27,10 @@ pub fn unit_float(bits: [u32; 4]) -> [f64; 4] {
 /// Four numbers of one dimension of one sample; see the kernel's source.
 #[must_use]
 pub fn random4(stream: [u32; 2], pixel: [u32; 2], sample_low: u32, dimension: u32) -> [f64; 4] {
-    unit_float(pcg4d([(pixel[0] | (pixel[1] << 16)) ^ stream[0], sample_low, dimension, stream[1]]))
+    unit_float(pcg4d([
+        (pixel[0] | (pixel[1] << 16)) ^ stream[0],
+        sample_low,
+        dimension,
+        stream[1],
+    ]))
 }

@@ -23,7 +23,11 @@ pub fn sphere_direction(u: DVec2) -> DVec3 {
 pub fn cosine_direction(n: DVec3, u: DVec2) -> DVec3 {
     let v = n + sphere_direction(u);
     // The kernel's threshold, since the two must agree on the direction.
-    if v.length_squared() > 1.0e-12 { v.normalize() } else { n }
+    if v.length_squared() > 1.0e-12 {
+        v.normalize()
+    } else {
+        n
+    }
 }
 
 /// Two unit vectors that make an orthonormal basis with the unit vector n.

@@ -47,5 +47,9 @@ pub fn vertex_at(ray: &Ray, hit: &Hit, sphere: &PlacedSphere) -> Vertex {
         }
     };
     let normal = if hit.inside { -outward } else { outward };
-    Vertex { anchor: sphere.anchor, offset, normal }
+    Vertex {
+        anchor: sphere.anchor,
+        offset,
+        normal,
+    }
 }

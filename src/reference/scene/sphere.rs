@@ -26,7 +26,11 @@ pub fn root_outside(q: &Quadratic, own: bool) -> Option<f64> {
 /// The root of a path inside the sphere.
 #[must_use]
 pub fn root_interior(q: &Quadratic, own: bool) -> f64 {
-    let s = if own { q.b.abs() } else { q.square.max(0.0).sqrt() };
+    let s = if own {
+        q.b.abs()
+    } else {
+        q.square.max(0.0).sqrt()
+    };
     let depth = if own { 0.0 } else { (-q.c).max(0.0) };
     let sum = q.b.abs() + s;
     if q.b >= 0.0 { sum / q.a } else { depth / sum }
@@ -49,7 +53,12 @@ pub fn pole_quadratic(x: DVec3, direction: DVec3, normal: DVec3, curvature: f64)
     let a = curvature * direction.length_squared();
     let b = -(curvature * x.dot(direction) + normal.dot(direction));
     let c = curvature * x.length_squared() + 2.0 * normal.dot(x);
-    Quadratic { a, b, square: b * b - a * c, c }
+    Quadratic {
+        a,
+        b,
+        square: b * b - a * c,
+        c,
+    }
 }
 
 /// The nearest hit on any of `spheres`; of equally near ones that of the lowest index.
@@ -69,7 +78,11 @@ pub fn closest_hit(ray: &Ray, spheres: &[PlacedSphere]) -> Option<Hit> {
             Side::Either if own => ray.inward,
             Side::Either => q.c < 0.0,
         };
-        let t = if inside { Some(root_interior(&q, own)) } else { root_outside(&q, own) };
+        let t = if inside {
+            Some(root_interior(&q, own))
+        } else {
+            root_outside(&q, own)
+        };
         if let Some(t) = t
             && nearest.is_none_or(|hit| t < hit.t)
         {

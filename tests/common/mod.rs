@@ -1,0 +1,200 @@
+//! What the GPU tests share: a device, kernels for any set of effects, and statistics.
+#![expect(dead_code, reason = "each test binary uses a part of it")]
+
+pub(crate) mod statistics;
+
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+
+use gpu_trace::effects::Effects;
+use gpu_trace::film::Film;
+use gpu_trace::gpu::device::{DRIVER_ADVICE, DeviceChoice, Gpu, open};
+use gpu_trace::gpu::probe::Probe;
+use gpu_trace::gpu::renderer::GpuRenderer;
+use gpu_trace::placement::Placement;
+use gpu_trace::reference::path::ReferenceRenderer;
+use gpu_trace::render::render_quietly;
+use gpu_trace::scene::Scene;
+use gpu_trace::scene::load::{load_file, load_str};
+use gpu_trace::settings::{Rect, Settings};
+
+/// Unit roundoff of f32.
+pub(crate) const U: f64 = 1.0 / (1 << 24) as f64;
+
+/// A row of the probe.
+pub(crate) type Row = [f32; 4];
+
+/// The device of this test binary.
+///
+/// # Panics
+/// If there is none: a test that does not run must not pass.
+pub(crate) fn gpu() -> Gpu {
+    static GPU: OnceLock<Gpu> = OnceLock::new();
+    let gpu = GPU.get_or_init(|| {
+        open(&DeviceChoice::Best).unwrap_or_else(|e| {
+            panic!(
+                "these tests need a GPU adapter: {e}\n{DRIVER_ADVICE}; `cargo xtask test` does it"
+            )
+        })
+    });
+    gpu.clone()
+}
+
+/// A scene from text.
+pub(crate) fn scene(text: &str) -> Scene {
+    load_str("test", text)
+        .unwrap_or_else(|e| panic!("{e}"))
+        .scene
+}
+
+/// A scene from a file of the repository.
+pub(crate) fn scene_file(path: impl AsRef<Path>) -> Scene {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(path);
+    load_file(&path).unwrap_or_else(|e| panic!("{e}")).scene
+}
+
+/// All scene files, relative to the repository.
+pub(crate) fn scene_files() -> Vec<PathBuf> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut files = Vec::new();
+    for folder in ["scenes", "scenes/tests"] {
+        let entries = std::fs::read_dir(root.join(folder)).expect("the folder of scenes");
+        for entry in entries {
+            let path = entry.expect("an entry of the folder").path();
+            if path.extension().is_some_and(|e| e == "toml") {
+                files.push(path.strip_prefix(root).expect("below the root").to_owned());
+            }
+        }
+    }
+    files.sort();
+    assert!(files.len() >= 10, "only {} scenes found", files.len());
+    files
+}
+
+/// The settings of `scene` at another size and number of samples.
+pub(crate) fn settings(scene: &Scene, width: u32, height: u32, spp: u64) -> Settings {
+    Settings {
+        width,
+        height,
+        crop: Rect {
+            x: 0,
+            y: 0,
+            width,
+            height,
+        },
+        samples: 0..spp,
+        ..Settings::for_scene(scene)
+    }
+}
+
+/// A renderer on the GPU.
+pub(crate) fn gpu_renderer(scene: &Scene, settings: &Settings) -> GpuRenderer {
+    let placement = Placement::new(scene, settings.width, settings.height);
+    let effects = Effects::derive(scene, &placement, settings);
+    GpuRenderer::new(gpu(), scene, &placement, &effects, settings).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// Renders on the GPU.
+pub(crate) fn render_gpu(scene: &Scene, settings: &Settings) -> Film {
+    let mut renderer = gpu_renderer(scene, settings);
+    render_quietly(&mut renderer, settings)
+        .unwrap_or_else(|e| panic!("{e}"))
+        .film
+}
+
+/// Renders with the CPU reference.
+pub(crate) fn render_cpu(scene: &Scene, settings: &Settings) -> Film {
+    let placement = Placement::new(scene, settings.width, settings.height);
+    let mut renderer =
+        ReferenceRenderer::new(scene, &placement, settings, 0).unwrap_or_else(|e| panic!("{e}"));
+    render_quietly(&mut renderer, settings)
+        .unwrap_or_else(|e| panic!("{e}"))
+        .film
+}
+
+/// The means of all pixels and channels, rows from the top.
+pub(crate) fn means(film: &Film) -> Vec<f64> {
+    (0..film.rect().pixels())
+        .flat_map(|i| film.mean(i))
+        .collect()
+}
+
+/// The bits of the image that a film gives.
+pub(crate) fn image_bits(film: &Film) -> Vec<u32> {
+    film.pixels()
+        .as_flattened()
+        .iter()
+        .map(|x| x.to_bits())
+        .collect()
+}
+
+/// A scene that has no effect of its own.
+pub(crate) const EMPTY: &str = "
+    [camera]
+    position = [0.0, 0.0, 4.0]
+    look_at = [0.0, 0.0, 0.0]
+    fov = 36.0
+    [image]
+    width = 16
+    height = 16
+";
+
+/// A probe of the functions that exactly `effects` bring, with the camera of `scene`.
+pub(crate) fn probe_of(scene: &Scene, effects: &[&str]) -> Probe {
+    let settings = Settings::for_scene(scene);
+    let placement = Placement::new(scene, settings.width, settings.height);
+    let effects = Effects::of(scene, &placement, &settings, effects);
+    Probe::new(&gpu(), scene, &placement, &effects).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// A probe of the functions that exactly `effects` bring.
+pub(crate) fn probe(effects: &[&str]) -> Probe {
+    probe_of(&scene(EMPTY), effects)
+}
+
+/// A deterministic source of test inputs, by the sample stream itself.
+#[derive(Debug)]
+pub(crate) struct Random {
+    key: [u32; 4],
+}
+
+impl Random {
+    /// A stream of its own for each `name`.
+    pub(crate) fn new(name: &str) -> Self {
+        // FNV-1a.
+        let hash = name.bytes().fold(0x811c_9dc5, |h: u32, b| {
+            (h ^ u32::from(b)).wrapping_mul(0x0100_0193)
+        });
+        Self {
+            key: [hash, 0, 0, 0],
+        }
+    }
+
+    /// Four random words.
+    pub(crate) fn words(&mut self) -> [u32; 4] {
+        self.key[1] += 1;
+        gpu_trace::reference::core::random::pcg4d(self.key)
+    }
+
+    /// Four uniform numbers in [0, 1) with 24 bits, as the kernel has them.
+    pub(crate) fn unit4(&mut self) -> Row {
+        gpu_trace::reference::core::random::unit_float(self.words()).map(|x| x as f32)
+    }
+
+    /// A uniform number in [0, 1).
+    pub(crate) fn unit(&mut self) -> f64 {
+        f64::from(self.unit4()[0])
+    }
+
+    /// A uniform number in [low, high).
+    pub(crate) fn range(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.unit()
+    }
+
+    /// A uniform direction.
+    pub(crate) fn direction(&mut self) -> glam::DVec3 {
+        let u = self.unit4();
+        let u = glam::DVec2::new(f64::from(u[0]), f64::from(u[1]));
+        gpu_trace::reference::core::sampling::sphere_direction(u)
+    }
+}

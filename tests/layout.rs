@@ -1,0 +1,225 @@
+//! The structs that host and kernel share have the same layout on both sides.
+
+mod common;
+
+use std::mem::offset_of;
+
+use common::{EMPTY, scene};
+use glam::DVec3;
+use gpu_trace::effects::Effects;
+use gpu_trace::gpu::layout::{
+    CameraRecord, CountersRecord, DispatchRecord, MaterialRecord, PoleRecord, SphereRecord,
+};
+use gpu_trace::gpu::probe::ShapeRecord;
+use gpu_trace::placement::Placement;
+use gpu_trace::scene::{Material, MaterialKind};
+use gpu_trace::settings::Settings;
+use gpu_trace::shader::{Kernel, Stage, link};
+
+/// Name and offset of every member, and the size.
+type Layout = (Vec<(String, u32)>, u32);
+
+/// Every member of a record with its offset. A pattern without `..` names them all, or it does not
+/// compile.
+macro_rules! host {
+    ($record:ident { $($member:ident),* $(,)? }) => {{
+        let $record { $($member: _),* } = <$record as bytemuck::Zeroable>::zeroed();
+        let members = vec![$((stringify!($member).to_owned(), offset_of!($record, $member) as u32)),*];
+        (members, size_of::<$record>() as u32)
+    }};
+}
+
+/// A kernel with exactly `names`. The scene has no spheres: only types matter.
+fn kernel(stage: Stage, names: &[&str]) -> Kernel {
+    let scene = scene(EMPTY);
+    let settings = Settings::for_scene(&scene);
+    let placement = Placement::new(&scene, settings.width, settings.height);
+    let effects = Effects::of(&scene, &placement, &settings, names);
+    link(stage, &scene, &placement, &effects).unwrap_or_else(|e| panic!("{e}"))
+}
+
+fn device(kernel: &Kernel, name: &str) -> Layout {
+    kernel.struct_members(name).unwrap_or_else(|| panic!("no struct {name} in\n{}", kernel.wgsl))
+}
+
+/// What is wrong with `host` as the host's side of `device`, if anything is. The host may have
+/// padding of its own; `longer` allows it to go on where the kernel's struct ends.
+fn mismatch(host: &Layout, device: &Layout, longer: bool) -> Option<String> {
+    for member in &device.0 {
+        if !host.0.contains(member) {
+            return Some(format!("the host has no {} at {}", member.0, member.1));
+        }
+    }
+    for (name, offset) in &host.0 {
+        let there = device.0.iter().any(|(n, _)| n == name);
+        if !there && !name.starts_with("unused") && !(longer && *offset >= device.1) {
+            return Some(format!("the kernel has no {name} at {offset}"));
+        }
+    }
+    let fits = if longer { host.1 >= device.1 } else { host.1 == device.1 };
+    (!fits).then(|| format!("{} bytes on the host, {} in the kernel", host.1, device.1))
+}
+
+fn check(name: &str, host: &Layout, kernel: &Kernel) {
+    let device = device(kernel, name);
+    let wrong = mismatch(host, &device, false);
+    assert_eq!(wrong, None, "{name}: host {host:?}, kernel {device:?}");
+}
+
+/// Everything that fixed structs need.
+const FULL: [&str; 7] = ["list", "bsdf", "pole", "interior", "lens", "diffuse", "emission"];
+
+fn camera() -> Layout {
+    host!(CameraRecord {
+        anchor, approach, corner, unused0, across, unused1, down, unused2, forward, unused3,
+        lens_across, focus, lens_down, lens_share,
+    })
+}
+
+#[test]
+fn fixed_structs_agree() {
+    let kernel = kernel(Stage::Path, &FULL);
+    check("Sphere", &host!(SphereRecord { center, radius }), &kernel);
+    check("Pole", &host!(PoleRecord { point, curvature, normal, unused }), &kernel);
+    check("Camera", &camera(), &kernel);
+    let dispatch = host!(DispatchRecord {
+        region_origin, region_size, first_tile, end_tile, first_sample, end_sample, window_start,
+        unused, stream,
+    });
+    check("Dispatch", &dispatch, &kernel);
+    let counters = host!(CountersRecord { non_finite, first_pixel, sample_low, bounce });
+    check("Counters", &counters, &kernel);
+}
+
+#[test]
+fn the_probes_shape_agrees() {
+    let shape = host!(ShapeRecord { count, inputs, outputs, unused });
+    check("Shape", &shape, &kernel(Stage::Probe, &[]));
+}
+
+#[test]
+fn a_camera_without_lens_is_the_start_of_one_with_a_lens() {
+    let device = device(&kernel(Stage::Path, &["list", "bsdf"]), "Camera");
+    assert!(device.0.iter().all(|(name, _)| !name.contains("lens")), "{device:?}");
+    assert_eq!(mismatch(&camera(), &device, true), None);
+}
+
+#[test]
+fn companion_a_wrong_layout_is_found() {
+    let kernel = kernel(Stage::Path, &FULL);
+    let device = device(&kernel, "Camera");
+    let good = camera();
+    assert_eq!(mismatch(&good, &device, false), None);
+    let mut moved = good.clone();
+    moved.0[2].1 += 4;
+    assert!(mismatch(&moved, &device, false).is_some());
+    let mut swapped = good.clone();
+    swapped.0.swap(10, 12);
+    let (a, b) = (swapped.0[10].1, swapped.0[12].1);
+    (swapped.0[10].1, swapped.0[12].1) = (b, a);
+    assert!(mismatch(&swapped, &device, false).is_some());
+    let mut more = good.clone();
+    more.0.push(("extra".into(), good.1));
+    assert!(mismatch(&more, &device, false).is_some());
+    assert!(mismatch(&(good.0, good.1 + 16), &device, false).is_some());
+}
+
+/// Offsets and size of `Material` by WGSL's rules and the alignments that `material.wesl` asks for:
+/// name, align, size.
+fn material_by_the_rules(emission: bool, reflective: bool, dielectric: bool) -> Layout {
+    let members = [
+        (true, "color", 16, 12),
+        (true, "kind", 4, 4),
+        (emission, "emission", 16, 12),
+        (reflective, "specular", 16, 12),
+        (reflective, "epsilon", 4, 4),
+        (reflective, "mu", 4, 4),
+        (reflective, "lobe_weight", 4, 4),
+        (reflective, "color_weight", 4, 4),
+        (dielectric, "ior", 16, 4),
+    ];
+    let mut end: u32 = 0;
+    let mut layout = Vec::new();
+    for (_, name, align, size) in members.into_iter().filter(|m| m.0) {
+        let offset = end.next_multiple_of(align);
+        layout.push((name.to_owned(), offset));
+        end = offset + size;
+    }
+    (layout, end.next_multiple_of(16))
+}
+
+#[test]
+fn material_agrees_for_all_subsets() {
+    let value = |x: f64| DVec3::new(x, x + 0.125, x + 0.25);
+    let shiny = Material {
+        name: "shiny".into(),
+        kind: MaterialKind::Reflective {
+            albedo: value(0.5),
+            specular: value(0.25),
+            epsilon: 0.0625,
+            mu: 3.5,
+        },
+        emission: value(7.0),
+    };
+    let glass =
+        Material { kind: MaterialKind::Dielectric { ior: 1.75 }, ..shiny.clone() };
+    for subset in 0..8 {
+        let [emission, reflective, dielectric] = [1, 2, 4].map(|bit| subset & bit != 0);
+        let mut names = vec!["list", "bsdf", "diffuse"];
+        let optional = [
+            (emission, "emission"), (reflective, "reflective"), (dielectric, "dielectric"),
+            (dielectric, "interior"),
+        ];
+        names.extend(optional.iter().filter(|(used, _)| *used).map(|(_, name)| *name));
+        let kernel = kernel(Stage::Path, &names);
+        let device = device(&kernel, "Material");
+        let rules = material_by_the_rules(emission, reflective, dielectric);
+        assert_eq!(device, rules, "{names:?}");
+
+        let scene = scene(EMPTY);
+        let settings = Settings::for_scene(&scene);
+        let placement = Placement::new(&scene, 1, 1);
+        let effects = Effects::of(&scene, &placement, &settings, &names);
+        let members: Vec<&str> = MaterialRecord::members(&effects).collect();
+        let expected: Vec<&str> = rules.0.iter().map(|(name, _)| name.as_str()).collect();
+        assert_eq!(members, expected, "{names:?}");
+
+        // Every value lies where the rules say.
+        for material in [&shiny, &glass] {
+            let bytes = MaterialRecord::new(material).bytes(&device.0, device.1);
+            assert_eq!(bytes.len(), rules.1 as usize);
+            let word = |name: &str, i: usize| -> Option<f32> {
+                let (_, offset) = rules.0.iter().find(|(n, _)| n == name)?;
+                let at = *offset as usize + 4 * i;
+                Some(f32::from_ne_bytes(bytes[at..at + 4].try_into().expect("four bytes")))
+            };
+            let is_glass = material.name == glass.name && material.kind == glass.kind;
+            assert_eq!(word("kind", 0).map(f32::to_bits), Some(if is_glass { 2 } else { 3 }));
+            assert_eq!(word("emission", 1), emission.then_some(7.125));
+            assert_eq!(word("ior", 0), dielectric.then_some(if is_glass { 1.75 } else { 1.0 }));
+            if !is_glass {
+                assert_eq!(word("color", 2), Some(0.75));
+                assert_eq!(word("specular", 1), reflective.then_some(0.375));
+                assert_eq!(word("epsilon", 0), reflective.then_some(0.0625));
+                assert_eq!(word("mu", 0), reflective.then_some(3.5));
+                // Luminance of (0.5, 0.625, 0.75).
+                let weight = (0.2126 * 0.5 + 0.7152 * 0.625 + 0.0722 * 0.75) as f32;
+                assert_eq!(word("color_weight", 0), reflective.then_some(weight));
+            }
+        }
+    }
+}
+
+#[test]
+fn attributes_agree() {
+    for (names, expected) in [
+        (&["list", "bsdf", "diffuse"][..], vec![("material", 0)]),
+        (&["list", "bsdf", "diffuse", "interior"], vec![("material", 0), ("side", 4)]),
+    ] {
+        let (members, size) = device(&kernel(Stage::Path, names), "Attributes");
+        let members: Vec<(&str, u32)> = members.iter().map(|(n, o)| (n.as_str(), *o)).collect();
+        assert_eq!(members, expected);
+        // The renderer writes words without padding.
+        assert_eq!(size as usize, 4 * expected.len());
+    }
+}
