@@ -120,6 +120,13 @@ impl Effects {
                 reasons: kind(&|k| matches!(k, MaterialKind::Dielectric { .. })),
             },
             Effect {
+                name: "priority",
+                what: "dielectrics that touch, nest or overlap",
+                reasons: placement.media.example.map_or(vec![], |[a, b]| {
+                    vec![format!("spheres {} and {}", a.min(b) + 1, a.max(b) + 1)]
+                }),
+            },
+            Effect {
                 name: "reflective",
                 what: "the lecture's lobe around the ideal reflection",
                 reasons: kind(&|k| matches!(k, MaterialKind::Reflective { .. })),

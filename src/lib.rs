@@ -7,6 +7,7 @@
 //! 2. [`settings`]: what will be rendered, validated.
 //! 3. [`scene`]: the scene file, validated.
 //! 4. [`placement`]: where everything is, in f64, relative to where the picture is.
+//!    [`media`]: which of several dielectrics fills the space.
 //! 5. [`effects`]: what the scene asks for; nothing else goes into the kernel.
 //! 6. [`shader`]: the kernel, linked for these effects from `shaders/`.
 //! 7. [`gpu`] and [`reference`](mod@reference): two renderers, wgpu in f32 and the CPU in f64, that
@@ -24,6 +25,7 @@ pub mod error;
 pub mod estimate;
 pub mod film;
 pub mod gpu;
+pub mod media;
 pub mod output;
 pub mod placement;
 pub mod reference;

@@ -8,6 +8,7 @@
 
 use glam::DVec3;
 
+use crate::media::Media;
 use crate::scene::{Handedness, MaterialKind, Scene};
 
 /// A scene's spheres and camera as the renderers use them.
@@ -19,6 +20,8 @@ pub struct Placement {
     pub spheres: Vec<PlacedSphere>,
     /// How many of `spheres` have a pole frame.
     pub poles: usize,
+    /// Which dielectrics take precedence where they share points.
+    pub media: Media,
     /// The camera.
     pub camera: PlacedCamera,
 }
@@ -38,6 +41,8 @@ pub struct PlacedSphere {
     pub pole: Option<DVec3>,
     /// Which side of the surface paths can be on.
     pub side: Side,
+    /// Precedence among dielectrics that share points; see [`Media`].
+    pub level: u32,
 }
 
 /// Which side of a sphere's surface paths can be on.
@@ -102,6 +107,7 @@ impl Placement {
         let poles: Vec<Option<DVec3>> = (0..centers.len())
             .map(|i| pole_normal(scene, &centers, i))
             .collect();
+        let media = Media::new(scene);
         let scale = unit(scene, &centers, &poles);
         let mut spheres: Vec<PlacedSphere> = (0..centers.len())
             .map(|i| {
@@ -116,6 +122,7 @@ impl Placement {
                     radius: sphere.radius * scale,
                     pole: normal,
                     side: side(scene, i),
+                    level: media.level[i],
                 }
             })
             .collect();
@@ -126,6 +133,7 @@ impl Placement {
             scale,
             spheres,
             poles,
+            media,
             camera,
         }
     }
@@ -155,6 +163,9 @@ fn approach(scene: &Scene, forward: DVec3) -> f64 {
 fn pole_normal(scene: &Scene, centers: &[DVec3], i: usize) -> Option<DVec3> {
     let (center, radius) = (centers[i], scene.spheres[i].radius);
     let small = |j: &usize| *j != i && scene.spheres[*j].radius < POLE_NEAR * radius;
+    if !(0..centers.len()).any(|j| small(&j)) && alone(scene, centers[i], i) {
+        return None;
+    }
     // The camera's view starts at the origin.
     let eye = scene.camera.position;
     let eye = eye - (scene.spheres[i].center - center);
@@ -178,6 +189,14 @@ fn pole_normal(scene: &Scene, centers: &[DVec3], i: usize) -> Option<DVec3> {
     // Offsets are summed rather than points, so that the scene's place does not matter.
     let middle = near.iter().map(|p| *p - center).sum::<DVec3>() / near.len() as f64;
     middle.try_normalize()
+}
+
+/// Whether neither the camera nor the start of its view is near the surface of sphere `i`.
+fn alone(scene: &Scene, center: DVec3, i: usize) -> bool {
+    let sphere = &scene.spheres[i];
+    let near = POLE_NEAR * sphere.radius;
+    let gap = |offset: DVec3| (offset.length() - sphere.radius).abs();
+    gap(scene.camera.position - sphere.center) >= near && gap(center) >= near
 }
 
 /// The pole: the centre is the large number here, and what is left of it the small one.

@@ -18,24 +18,51 @@ type Set = BTreeSet<&'static str>;
 
 /// All effects, in the table's order.
 const ALL: [&str; 14] = [
-    "baked", "list", "pole", "interior", "lens", "diffuse", "mirror", "dielectric", "reflective",
-    "emission", "environment", "lecture", "bsdf", "roulette",
+    "baked",
+    "list",
+    "pole",
+    "interior",
+    "lens",
+    "diffuse",
+    "mirror",
+    "dielectric",
+    "reflective",
+    "emission",
+    "environment",
+    "lecture",
+    "bsdf",
+    "roulette",
 ];
 
 /// Of these, only one can be in use.
-const EXCLUSIVE: [[&str; 2]; 3] = [["baked", "list"], ["lecture", "bsdf"], ["lecture", "roulette"]];
+const EXCLUSIVE: [[&str; 2]; 3] = [
+    ["baked", "list"],
+    ["lecture", "bsdf"],
+    ["lecture", "roulette"],
+];
 
 const MATERIALS: [&str; 4] = ["diffuse", "mirror", "dielectric", "reflective"];
 
 /// Effects that must leave no trace in the WGSL where they are not in use, in any case, not even as
 /// a part of a name.
 const WORDS: [&str; 11] = [
-    "diffuse", "mirror", "dielectric", "reflective", "lens", "environment", "emission", "roulette",
-    "pole", "interior", "lecture",
+    "diffuse",
+    "mirror",
+    "dielectric",
+    "reflective",
+    "lens",
+    "environment",
+    "emission",
+    "roulette",
+    "pole",
+    "interior",
+    "lecture",
 ];
 
 fn possible(set: &Set) -> bool {
-    EXCLUSIVE.iter().all(|pair| !pair.iter().all(|name| set.contains(name)))
+    EXCLUSIVE
+        .iter()
+        .all(|pair| !pair.iter().all(|name| set.contains(name)))
 }
 
 /// `names` and the least that they need to be a kernel.
@@ -50,7 +77,9 @@ fn completed(names: impl IntoIterator<Item = &'static str>) -> Set {
     if set.contains("dielectric") {
         set.insert("interior");
     }
-    let surface = ["pole", "interior", "emission"].iter().any(|name| set.contains(name));
+    let surface = ["pole", "interior", "emission"]
+        .iter()
+        .any(|name| set.contains(name));
     if surface && !MATERIALS.iter().any(|m| set.contains(m)) {
         set.insert("diffuse");
     }
@@ -60,7 +89,8 @@ fn completed(names: impl IntoIterator<Item = &'static str>) -> Set {
 /// A scene and settings that ask for exactly the effects of `set`.
 fn asking_for(set: &Set) -> (Scene, Settings) {
     let has = |name: &str| set.contains(name);
-    let mut text = String::from("[camera]\nposition = [0, 0, 6]\nlook_at = [0, 0, 0]\nfov = 40.0\n");
+    let mut text =
+        String::from("[camera]\nposition = [0, 0, 6]\nlook_at = [0, 0, 0]\nfov = 40.0\n");
     if has("lens") {
         text += "aperture_radius = 0.1\nfocus_distance = 6.0\n";
     }
@@ -88,7 +118,8 @@ fn asking_for(set: &Set) -> (Scene, Settings) {
         );
     };
     for i in 0..materials.len() {
-        sphere(i, 2.0 * i as f64, 0.0, 0.5);
+        // Off the view axis: what the view starts at has a pole frame.
+        sphere(i, 2.0 * i as f64, 1.5, 0.5);
     }
     if has("pole") {
         sphere(0, 0.0, -10001.0, 10000.0);
@@ -99,7 +130,11 @@ fn asking_for(set: &Set) -> (Scene, Settings) {
     }
     let scene = scene(&text);
     let settings = Settings {
-        geometry: if has("list") { GeometryChoice::List } else { GeometryChoice::Baked },
+        geometry: if has("list") {
+            GeometryChoice::List
+        } else {
+            GeometryChoice::Baked
+        },
         integrator: if has("lecture") {
             Integrator::Lecture { termination: 0.2 }
         } else {
@@ -123,7 +158,12 @@ fn fault(set: &Set) -> Option<String> {
     fault_of(&scene, &placement, &effects, true)
 }
 
-fn fault_of(scene: &Scene, placement: &Placement, effects: &Effects, probe: bool) -> Option<String> {
+fn fault_of(
+    scene: &Scene,
+    placement: &Placement,
+    effects: &Effects,
+    probe: bool,
+) -> Option<String> {
     let names: Vec<&str> = effects.names().collect();
     if probe && let Err(e) = link(Stage::Probe, scene, placement, effects) {
         return Some(format!("{names:?}: the probe: {e}"));
@@ -151,8 +191,18 @@ fn wrong_words(wgsl: &str, effects: &Effects) -> Option<String> {
 fn check(sets: &BTreeSet<Set>) {
     let all: Vec<&Set> = sets.iter().collect();
     let faults: Vec<String> = all.par_iter().filter_map(|set| fault(set)).collect();
-    let shown = faults.iter().take(8).cloned().collect::<Vec<_>>().join("\n");
-    assert!(faults.is_empty(), "{} of {} sets:\n{shown}", faults.len(), sets.len());
+    let shown = faults
+        .iter()
+        .take(8)
+        .cloned()
+        .collect::<Vec<_>>()
+        .join("\n");
+    assert!(
+        faults.is_empty(),
+        "{} of {} sets:\n{shown}",
+        faults.len(),
+        sets.len()
+    );
 }
 
 #[test]
@@ -167,7 +217,11 @@ fn the_table_is_the_one_tested() {
 #[test]
 fn each_effect_alone() {
     let mut sets: BTreeSet<Set> = ALL.iter().map(|name| completed([*name])).collect();
-    sets.extend(ALL.iter().map(|name| completed([*name, "list"])).filter(possible));
+    sets.extend(
+        ALL.iter()
+            .map(|name| completed([*name, "list"]))
+            .filter(possible),
+    );
     check(&sets);
 }
 
@@ -215,7 +269,11 @@ fn all_and_all_but_one() {
             // What needs it goes with it.
             let needed = rest.contains(left_out);
             let rest = if needed && *left_out == "interior" {
-                completed(all.iter().copied().filter(|n| !["interior", "dielectric"].contains(n)))
+                completed(
+                    all.iter()
+                        .copied()
+                        .filter(|n| !["interior", "dielectric"].contains(n)),
+                )
             } else {
                 rest
             };
@@ -227,11 +285,28 @@ fn all_and_all_but_one() {
 }
 
 #[test]
+fn every_possible_set() {
+    let sets = (0..1 << ALL.len()).map(|bits: u32| {
+        completed(ALL.into_iter().enumerate().filter(|(i, _)| bits >> i & 1 == 1).map(|(_, n)| n))
+    });
+    let sets: BTreeSet<Set> = sets.filter(possible).collect();
+    eprintln!("{} sets", sets.len());
+    check(&sets);
+}
+
+#[test]
 fn every_set_in_the_scenes() {
     // As they are, and with the other geometry and integrator.
     let jobs: Vec<_> = scene_files()
         .into_iter()
-        .flat_map(|path| [(path.clone(), 0), (path.clone(), 1), (path.clone(), 2), (path, 3)])
+        .flat_map(|path| {
+            [
+                (path.clone(), 0),
+                (path.clone(), 1),
+                (path.clone(), 2),
+                (path, 3),
+            ]
+        })
         .collect();
     let faults: Vec<String> = jobs
         .par_iter()
@@ -246,7 +321,8 @@ fn every_set_in_the_scenes() {
             }
             let placement = Placement::new(&scene, settings.width, settings.height);
             let effects = Effects::derive(&scene, &placement, &settings);
-            fault_of(&scene, &placement, &effects, false).map(|f| format!("{}: {f}", path.display()))
+            fault_of(&scene, &placement, &effects, false)
+                .map(|f| format!("{}: {f}", path.display()))
         })
         .collect();
     assert!(faults.is_empty(), "{}", faults.join("\n"));
@@ -256,7 +332,9 @@ fn every_set_in_the_scenes() {
 fn companion_the_search_finds() {
     // A kernel with everything against a table with nothing, and the other way round: every word
     // is found, and its absence is.
-    let [full, ..] = &largest()[..] else { panic!("no largest set") };
+    let [full, ..] = &largest()[..] else {
+        panic!("no largest set")
+    };
     let (scene, settings) = asking_for(full);
     let placement = Placement::new(&scene, settings.width, settings.height);
     let kernel = |names: &[&str]| {
@@ -269,9 +347,17 @@ fn companion_the_search_finds() {
         let without: Vec<&str> = names.iter().copied().filter(|n| n != word).collect();
         let effects = Effects::of(&scene, &placement, &settings, &without);
         let found = wrong_words(&wgsl, &effects);
-        assert!(found.as_ref().is_some_and(|f| f.contains("occurs")), "{word}: {found:?}");
+        assert!(
+            found.as_ref().is_some_and(|f| f.contains("occurs")),
+            "{word}: {found:?}"
+        );
         let alone = Effects::of(&scene, &placement, &settings, &[word]);
         let missing = wrong_words("fn main() {}", &alone);
-        assert!(missing.as_ref().is_some_and(|f| f.contains("does not occur")), "{missing:?}");
+        assert!(
+            missing
+                .as_ref()
+                .is_some_and(|f| f.contains("does not occur")),
+            "{missing:?}"
+        );
     }
 }

@@ -39,7 +39,9 @@ fn kernel(stage: Stage, names: &[&str]) -> Kernel {
 }
 
 fn device(kernel: &Kernel, name: &str) -> Layout {
-    kernel.struct_members(name).unwrap_or_else(|| panic!("no struct {name} in\n{}", kernel.wgsl))
+    kernel
+        .struct_members(name)
+        .unwrap_or_else(|| panic!("no struct {name} in\n{}", kernel.wgsl))
 }
 
 /// What is wrong with `host` as the host's side of `device`, if anything is. The host may have
@@ -56,7 +58,11 @@ fn mismatch(host: &Layout, device: &Layout, longer: bool) -> Option<String> {
             return Some(format!("the kernel has no {name} at {offset}"));
         }
     }
-    let fits = if longer { host.1 >= device.1 } else { host.1 == device.1 };
+    let fits = if longer {
+        host.1 >= device.1
+    } else {
+        host.1 == device.1
+    };
     (!fits).then(|| format!("{} bytes on the host, {} in the kernel", host.1, device.1))
 }
 
@@ -67,12 +73,26 @@ fn check(name: &str, host: &Layout, kernel: &Kernel) {
 }
 
 /// Everything that fixed structs need.
-const FULL: [&str; 7] = ["list", "bsdf", "pole", "interior", "lens", "diffuse", "emission"];
+const FULL: [&str; 7] = [
+    "list", "bsdf", "pole", "interior", "lens", "diffuse", "emission",
+];
 
 fn camera() -> Layout {
     host!(CameraRecord {
-        anchor, approach, corner, unused0, across, unused1, down, unused2, forward, unused3,
-        lens_across, focus, lens_down, lens_share,
+        anchor,
+        approach,
+        corner,
+        unused0,
+        across,
+        unused1,
+        down,
+        unused2,
+        forward,
+        unused3,
+        lens_across,
+        focus,
+        lens_down,
+        lens_share,
     })
 }
 
@@ -80,27 +100,56 @@ fn camera() -> Layout {
 fn fixed_structs_agree() {
     let kernel = kernel(Stage::Path, &FULL);
     check("Sphere", &host!(SphereRecord { center, radius }), &kernel);
-    check("Pole", &host!(PoleRecord { point, curvature, normal, unused }), &kernel);
+    check(
+        "Pole",
+        &host!(PoleRecord {
+            point,
+            curvature,
+            normal,
+            unused
+        }),
+        &kernel,
+    );
     check("Camera", &camera(), &kernel);
     let dispatch = host!(DispatchRecord {
-        region_origin, region_size, first_tile, end_tile, first_sample, end_sample, window_start,
-        unused, stream,
+        region_origin,
+        region_size,
+        first_tile,
+        end_tile,
+        first_sample,
+        end_sample,
+        window_start,
+        unused,
+        stream,
     });
     check("Dispatch", &dispatch, &kernel);
-    let counters = host!(CountersRecord { non_finite, first_pixel, sample_low, bounce });
+    let counters = host!(CountersRecord {
+        non_finite,
+        first_pixel,
+        sample_low,
+        bounce
+    });
     check("Counters", &counters, &kernel);
 }
 
 #[test]
 fn the_probes_shape_agrees() {
-    let shape = host!(ShapeRecord { count, inputs, outputs, unused });
+    let shape = host!(ShapeRecord {
+        count,
+        inputs,
+        outputs,
+        unused
+    });
     check("Shape", &shape, &kernel(Stage::Probe, &[]));
 }
 
 #[test]
 fn a_camera_without_lens_is_the_start_of_one_with_a_lens() {
     let device = device(&kernel(Stage::Path, &["list", "bsdf"]), "Camera");
-    assert!(device.0.iter().all(|(name, _)| !name.contains("lens")), "{device:?}");
+    assert!(
+        device.0.iter().all(|(name, _)| !name.contains("lens")),
+        "{device:?}"
+    );
     assert_eq!(mismatch(&camera(), &device, true), None);
 }
 
@@ -161,16 +210,25 @@ fn material_agrees_for_all_subsets() {
         },
         emission: value(7.0),
     };
-    let glass =
-        Material { kind: MaterialKind::Dielectric { ior: 1.75 }, ..shiny.clone() };
+    let glass = Material {
+        kind: MaterialKind::Dielectric { ior: 1.75 },
+        ..shiny.clone()
+    };
     for subset in 0..8 {
         let [emission, reflective, dielectric] = [1, 2, 4].map(|bit| subset & bit != 0);
         let mut names = vec!["list", "bsdf", "diffuse"];
         let optional = [
-            (emission, "emission"), (reflective, "reflective"), (dielectric, "dielectric"),
+            (emission, "emission"),
+            (reflective, "reflective"),
+            (dielectric, "dielectric"),
             (dielectric, "interior"),
         ];
-        names.extend(optional.iter().filter(|(used, _)| *used).map(|(_, name)| *name));
+        names.extend(
+            optional
+                .iter()
+                .filter(|(used, _)| *used)
+                .map(|(_, name)| *name),
+        );
         let kernel = kernel(Stage::Path, &names);
         let device = device(&kernel, "Material");
         let rules = material_by_the_rules(emission, reflective, dielectric);
@@ -191,12 +249,20 @@ fn material_agrees_for_all_subsets() {
             let word = |name: &str, i: usize| -> Option<f32> {
                 let (_, offset) = rules.0.iter().find(|(n, _)| n == name)?;
                 let at = *offset as usize + 4 * i;
-                Some(f32::from_ne_bytes(bytes[at..at + 4].try_into().expect("four bytes")))
+                Some(f32::from_ne_bytes(
+                    bytes[at..at + 4].try_into().expect("four bytes"),
+                ))
             };
             let is_glass = material.name == glass.name && material.kind == glass.kind;
-            assert_eq!(word("kind", 0).map(f32::to_bits), Some(if is_glass { 2 } else { 3 }));
+            assert_eq!(
+                word("kind", 0).map(f32::to_bits),
+                Some(if is_glass { 2 } else { 3 })
+            );
             assert_eq!(word("emission", 1), emission.then_some(7.125));
-            assert_eq!(word("ior", 0), dielectric.then_some(if is_glass { 1.75 } else { 1.0 }));
+            assert_eq!(
+                word("ior", 0),
+                dielectric.then_some(if is_glass { 1.75 } else { 1.0 })
+            );
             if !is_glass {
                 assert_eq!(word("color", 2), Some(0.75));
                 assert_eq!(word("specular", 1), reflective.then_some(0.375));
@@ -214,7 +280,10 @@ fn material_agrees_for_all_subsets() {
 fn attributes_agree() {
     for (names, expected) in [
         (&["list", "bsdf", "diffuse"][..], vec![("material", 0)]),
-        (&["list", "bsdf", "diffuse", "interior"], vec![("material", 0), ("side", 4)]),
+        (
+            &["list", "bsdf", "diffuse", "interior"],
+            vec![("material", 0), ("side", 4)],
+        ),
     ] {
         let (members, size) = device(&kernel(Stage::Path, names), "Attributes");
         let members: Vec<(&str, u32)> = members.iter().map(|(n, o)| (n.as_str(), *o)).collect();

@@ -12,6 +12,7 @@ use crate::error::{Error, Result};
 use crate::estimate::energy_cut_at_most;
 use crate::gpu::device::{self, DRIVER_ADVICE, DeviceChoice};
 use crate::gpu::renderer::GpuRenderer;
+use crate::media::MAX_LEVELS;
 use crate::output::stats::{BounceLimit, Device, Seconds};
 use crate::output::{
     Contents, Picture, Progress, Snapshot, Stats, Target, atomic, check_all, write_all,
@@ -132,6 +133,12 @@ fn prepare(args: &RenderArgs) -> Result<Job> {
         .filter(|path| path.is_file());
     check_all(&outputs, scene_file.as_slice())?;
     let placement = Placement::new(&loaded.scene, settings.width, settings.height);
+    if placement.media.levels > MAX_LEVELS {
+        return Err(Error::Scene(format!(
+            "more than {MAX_LEVELS} dielectrics lie in or across each other: the scene needs {} levels of priority",
+            placement.media.levels
+        )));
+    }
     let effects = Effects::derive(&loaded.scene, &placement, &settings);
     Ok(Job {
         loaded,

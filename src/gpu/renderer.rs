@@ -445,6 +445,9 @@ impl Uploads {
             if effects.has("interior") {
                 attributes.push(sphere.side as u32);
             }
+            if effects.has("priority") {
+                attributes.push(sphere.level);
+            }
         }
         all.push((0, "spheres", bytemuck::cast_slice(&spheres).to_vec()));
         all.push((1, "poles", bytemuck::cast_slice(&poles).to_vec()));

@@ -9,13 +9,14 @@ use super::bsdf::scatter::scatter;
 use super::core::random::random4;
 use super::light::environment_radiance;
 use super::scene::camera::camera_ray;
+use super::scene::priority::{cross_surface, relative_index};
 use super::scene::ray::{Ray, vertex_at};
 use super::scene::sphere::closest_hit;
 use crate::error::{Error, Result};
 use crate::film::{BLOCK, NonFinite, PixelSums, Tally, Window};
 use crate::placement::Placement;
 use crate::render::{Control, Renderer};
-use crate::scene::Scene;
+use crate::scene::{MaterialKind, Scene};
 use crate::settings::{Integrator, Rect, Settings, stream_words};
 
 /// What one path found.
@@ -58,6 +59,7 @@ impl PathTracer<'_> {
         let mut result = PathResult::default();
         let mut throughput = DVec3::ONE;
         let mut compression = 1.0;
+        let mut media = placement.media.camera.clone();
         loop {
             result.rays += 1;
             let Some(hit) = closest_hit(&ray, &placement.spheres) else {
@@ -73,14 +75,19 @@ impl PathTracer<'_> {
             }
             let u = random(result.bounces + 1);
             let vertex = vertex_at(&ray, &hit, sphere);
+            let (level, ior) = (sphere.level, ior_of(&material.kind));
+            let eta = relative_index(&media, level, ior, hit.inside);
             let s = scatter(
                 &material.kind,
                 vertex.normal,
                 ray.direction,
-                hit.inside,
+                eta,
                 u,
                 lecture,
             );
+            if s.crossed {
+                cross_surface(&mut media, level, ior, hit.inside);
+            }
             throughput *= s.weight;
             compression *= s.compression;
             let largest = (throughput * compression).max_element();
@@ -102,6 +109,13 @@ impl PathTracer<'_> {
             };
             result.bounces += 1;
         }
+    }
+}
+
+fn ior_of(kind: &MaterialKind) -> f64 {
+    match kind {
+        MaterialKind::Dielectric { ior } => *ior,
+        _ => 1.0,
     }
 }
 

@@ -315,6 +315,24 @@ mod tests {
     }
 
     #[test]
+    fn a_second_place_outside_of_the_window_is_left_out() {
+        for (text, shown) in [
+            ("a = 1, b = 2".to_owned(), true),
+            ("a = 1, ".repeat(100), false),
+        ] {
+            let end = text.len();
+            let problem = Problem::new(0..1, "wrong", "here").also(end - 1..end, "there");
+            let report = Report {
+                errors: vec![problem],
+                warnings: Vec::new(),
+            };
+            let rendered = report.error_text("a.toml", &text).expect("one error");
+            assert_eq!(rendered.contains("there"), shown, "{rendered}");
+            assert!(rendered.len() < 1000, "{rendered}");
+        }
+    }
+
+    #[test]
     fn a_flood_of_errors_is_cut() {
         let report = Report {
             errors: vec![Problem::new(0..1, "wrong", ""); 1000],

@@ -51,6 +51,7 @@ mod tests {
             ("centre", Some("center")),
             ("materials", Some("material")),
             ("colour", None),
+            ("tedium", None),
             ("x", None),
             ("", None),
         ] {

@@ -149,4 +149,14 @@ fn material_of(text: &mut String, scene: &Scene, placement: &Placement, effects:
         choose(text, &format!("material.{name}"), &values);
     }
     *text += "return material;\n}\n";
+    if effects.has("priority") {
+        let levels: Vec<String> = placement
+            .spheres
+            .iter()
+            .map(|s| format!("{}u", s.level))
+            .collect();
+        *text += "fn level_of(index: u32) -> u32 {\nvar level: u32;\n";
+        choose(text, "level", &levels);
+        *text += "return level;\n}\n";
+    }
 }

@@ -140,14 +140,31 @@ fn module_path(path: &str) -> ModulePath {
 
 /// The module `config`: sizes and constants of this scene.
 fn config(scene: &Scene, placement: &Placement, effects: &Effects) -> String {
-    let mut text = format!(
-        "const SPHERE_COUNT: u32 = {}u;\nconst POLE_COUNT: u32 = {}u;\n",
-        placement.spheres.len(),
-        placement.poles,
-    );
+    let mut text = String::new();
+    if effects.has("list") {
+        text += &format!("const SPHERE_COUNT: u32 = {}u;\n", placement.spheres.len());
+        if effects.has("pole") {
+            text += &format!("const POLE_COUNT: u32 = {}u;\n", placement.poles);
+        }
+    }
     if effects.has("environment") {
         let radiance = scene.environment.unwrap_or_default();
         text += &format!("const ENVIRONMENT: vec3f = {};\n", baked::vector(radiance));
+    }
+    if effects.has("priority") {
+        let levels = placement.media.levels.max(1);
+        let camera = &placement.media.camera;
+        let inside: u32 = camera.iter().map(|(level, _)| 1 << level).sum();
+        let ior = (0..levels).map(|level| {
+            let known = camera.iter().find(|(l, _)| *l == level);
+            baked::number(known.map_or(1.0, |(_, ior)| *ior))
+        });
+        let ior: Vec<String> = ior.collect();
+        text += &format!(
+            "const LEVELS: u32 = {levels}u;\nconst INITIAL_MEDIA: u32 = {inside}u;\n\
+             const INITIAL_IOR = array<f32, {levels}>({});\n",
+            ior.join(", ")
+        );
     }
     text
 }

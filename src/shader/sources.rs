@@ -18,6 +18,7 @@ sources![
     "scene/ray",
     "scene/sphere",
     "scene/list",
+    "scene/priority",
     "scene/material",
     "scene/camera",
     "bsdf/sample",

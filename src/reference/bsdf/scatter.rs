@@ -9,14 +9,15 @@ use super::reflective::{Reflective, sample_reflective, sample_reflective_uniform
 use super::sample::BsdfSample;
 use crate::scene::MaterialKind;
 
-/// Samples the material; `normal` is on the side of arrival, `uniform` asks for the lecture's
+/// Samples the material; `normal` is on the side of arrival, `eta` the index beyond a
+/// dielectric's surface over the one before, `uniform` asks for the lecture's
 /// uniform hemisphere where the material has more than delta lobes.
 #[must_use]
 pub fn scatter(
     material: &MaterialKind,
     normal: DVec3,
     arrival: DVec3,
-    inside: bool,
+    eta: f64,
     u: [f64; 4],
     uniform: bool,
 ) -> BsdfSample {
@@ -24,9 +25,7 @@ pub fn scatter(
         MaterialKind::Diffuse { albedo } if uniform => sample_diffuse_uniform(albedo, normal, u),
         MaterialKind::Diffuse { albedo } => sample_diffuse(albedo, normal, u),
         MaterialKind::Mirror { reflectance } => sample_mirror(reflectance, normal, arrival),
-        MaterialKind::Dielectric { ior } => {
-            sample_dielectric(if inside { 1.0 / ior } else { ior }, normal, arrival, u)
-        }
+        MaterialKind::Dielectric { .. } => sample_dielectric(eta, normal, arrival, u),
         MaterialKind::Reflective {
             albedo,
             specular,
