@@ -17,7 +17,7 @@ use rayon::prelude::*;
 type Set = BTreeSet<&'static str>;
 
 /// All effects, in the table's order.
-const ALL: [&str; 14] = [
+const ALL: [&str; 15] = [
     "baked",
     "list",
     "pole",
@@ -26,6 +26,7 @@ const ALL: [&str; 14] = [
     "diffuse",
     "mirror",
     "dielectric",
+    "priority",
     "reflective",
     "emission",
     "environment",
@@ -45,10 +46,11 @@ const MATERIALS: [&str; 4] = ["diffuse", "mirror", "dielectric", "reflective"];
 
 /// Effects that must leave no trace in the WGSL where they are not in use, in any case, not even as
 /// a part of a name.
-const WORDS: [&str; 11] = [
+const WORDS: [&str; 12] = [
     "diffuse",
     "mirror",
     "dielectric",
+    "priority",
     "reflective",
     "lens",
     "environment",
@@ -73,6 +75,9 @@ fn completed(names: impl IntoIterator<Item = &'static str>) -> Set {
     }
     if !set.contains("lecture") {
         set.insert("bsdf");
+    }
+    if set.contains("priority") {
+        set.insert("dielectric");
     }
     if set.contains("dielectric") {
         set.insert("interior");
@@ -120,6 +125,11 @@ fn asking_for(set: &Set) -> (Scene, Settings) {
     for i in 0..materials.len() {
         // Off the view axis: what the view starts at has a pole frame.
         sphere(i, 2.0 * i as f64, 1.5, 0.5);
+    }
+    if has("priority")
+        && let Some(i) = materials.iter().position(|m| *m == "dielectric")
+    {
+        sphere(i, 2.0 * i as f64, 1.75, 0.5);
     }
     if has("pole") {
         sphere(0, 0.0, -10001.0, 10000.0);
@@ -287,7 +297,12 @@ fn all_and_all_but_one() {
 #[test]
 fn every_possible_set() {
     let sets = (0..1 << ALL.len()).map(|bits: u32| {
-        completed(ALL.into_iter().enumerate().filter(|(i, _)| bits >> i & 1 == 1).map(|(_, n)| n))
+        completed(
+            ALL.into_iter()
+                .enumerate()
+                .filter(|(i, _)| bits >> i & 1 == 1)
+                .map(|(_, n)| n),
+        )
     });
     let sets: BTreeSet<Set> = sets.filter(possible).collect();
     eprintln!("{} sets", sets.len());

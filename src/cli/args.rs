@@ -9,7 +9,7 @@ use clap::{Args, ValueEnum};
 use super::values;
 use crate::error::{Error, Result};
 use crate::output::ProgressMode;
-use crate::scene::Scene;
+use crate::scene::{MAX_BOUNCES, Scene};
 use crate::settings::{
     DEFAULT_TERMINATION, GeometryChoice, Integrator, MAXIMUM_SPP, Rect, Settings,
 };
@@ -83,17 +83,17 @@ pub struct RenderArgs {
     pub verbose: bool,
 
     #[arg(
-        long, value_name = "N", value_parser = values::count, help_heading = "How long",
+        long, value_name = "N", value_parser = values::count, allow_negative_numbers = true, help_heading = "How long",
         help = "Samples a pixel [default: the scene's, or 256]"
     )]
     pub spp: Option<u64>,
     #[arg(
-        long, value_name = "P", value_parser = values::error, help_heading = "How long",
+        long, value_name = "P", value_parser = values::error, allow_negative_numbers = true, help_heading = "How long",
         help = "Stop at this estimated error: 1% or 0.01"
     )]
     pub error: Option<f64>,
     #[arg(
-        long, value_name = "TIME", value_parser = values::time, help_heading = "How long",
+        long, value_name = "TIME", value_parser = values::time, allow_negative_numbers = true, help_heading = "How long",
         help = "Stop after this time: 30s, 2m, 1h; whichever of --spp, --error and --time comes first"
     )]
     pub time: Option<Duration>,
@@ -117,6 +117,8 @@ pub struct RenderArgs {
     #[arg(
         long,
         value_name = "N",
+        value_parser = values::seed,
+        allow_negative_numbers = true,
         default_value = "0",
         hide_default_value = true,
         help_heading = "Image",
@@ -147,8 +149,8 @@ pub struct RenderArgs {
     )]
     pub sampler: SamplerArg,
     #[arg(
-        long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=1_000_000),
-        help_heading = "Light transport",
+        long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=i64::from(MAX_BOUNCES)),
+        allow_negative_numbers = true, help_heading = "Light transport",
         help = "Most scattering events of a path [default: the scene's, or 64]"
     )]
     pub max_bounces: Option<u32>,
@@ -162,7 +164,7 @@ pub struct RenderArgs {
     )]
     pub roulette: Option<OnOff>,
     #[arg(
-        long, value_name = "P", value_parser = values::termination, help_heading = "Light transport",
+        long, value_name = "P", value_parser = values::termination, allow_negative_numbers = true, help_heading = "Light transport",
         help = "Probability that the lecture's estimator ends at a vertex [default: 0.2]"
     )]
     pub termination: Option<f64>,
@@ -198,7 +200,7 @@ pub struct RenderArgs {
     pub geometry: GeometryArg,
     #[arg(
         long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024),
-        help_heading = "Device", help = "Threads of the CPU reference [default: one a core]"
+        allow_negative_numbers = true, help_heading = "Device", help = "Threads of the CPU reference [default: one a core]"
     )]
     pub threads: Option<u16>,
 }

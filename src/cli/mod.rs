@@ -9,9 +9,10 @@ mod shell;
 mod values;
 
 use std::io::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use clap::{Parser, Subcommand};
+use clap::error::{ContextKind, ContextValue, ErrorKind};
+use clap::{CommandFactory as _, Parser, Subcommand};
 
 use crate::error::{Error, Result};
 
@@ -99,6 +100,10 @@ pub fn main() -> u8 {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(error) => {
+            if let Some(text) = misplaced_word(&error) {
+                let _ = writeln!(std::io::stderr(), "error: {text}");
+                return 2;
+            }
             // Help and version go to stdout and are no error. A closed pipe is none either.
             let _ = error.print();
             return u8::try_from(error.exit_code()).unwrap_or(2);
@@ -124,7 +129,15 @@ pub fn main() -> u8 {
 
 fn run(cli: Cli) -> Result<()> {
     match cli.command {
-        None => render::run(&cli.render),
+        None => {
+            let scene = cli.render.scene.as_deref().unwrap_or_default();
+            if command_names().any(|name| name == scene) && !Path::new(scene).exists() {
+                return Err(Error::Usage(format!(
+                    "the command `{scene}` comes first: gpu-trace {scene} ..."
+                )));
+            }
+            render::run(&cli.render)
+        }
         Some(Command::Render(args)) => render::run(&args),
         Some(Command::Effects { render, json }) => effects::run(&render, json),
         Some(Command::Devices { json }) => devices::run(json),
@@ -134,6 +147,26 @@ fn run(cli: Cli) -> Result<()> {
         Some(Command::Completions { shell }) => shell::completions(shell),
         Some(Command::Man) => shell::man(),
     }
+}
+
+fn command_names() -> impl Iterator<Item = String> {
+    let command = Cli::command();
+    let names = command.get_subcommands().map(|c| c.get_name().to_owned());
+    names.collect::<Vec<_>>().into_iter()
+}
+
+/// What to say of a second word after the scene, which the parser takes for a command.
+fn misplaced_word(error: &clap::Error) -> Option<String> {
+    let Some(ContextValue::String(word)) = error.get(ContextKind::InvalidSubcommand) else {
+        return None;
+    };
+    (error.kind() == ErrorKind::ArgumentConflict).then(|| {
+        if command_names().any(|name| name == *word) {
+            format!("the command `{word}` comes first: gpu-trace {word} ...")
+        } else {
+            format!("unexpected argument '{word}': one scene is rendered at a time")
+        }
+    })
 }
 
 /// Prints a result. A reader that has seen enough (`| head`) is no error.

@@ -10,7 +10,7 @@ use super::print;
 use crate::effects::Effects;
 use crate::error::{Error, Result};
 use crate::estimate::energy_cut_at_most;
-use crate::gpu::device::{self, DRIVER_ADVICE, DeviceChoice};
+use crate::gpu::device::{self, DRIVER_ADVICE, DeviceChoice, Gpu};
 use crate::gpu::renderer::GpuRenderer;
 use crate::media::MAX_LEVELS;
 use crate::output::stats::{BounceLimit, Device, Seconds};
@@ -40,19 +40,27 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
     let job = prepare(args)?;
     let signals = Signals::listen()?;
     let progress = Progress::new(args.progress_mode(), args.quiet);
-    let mut warnings = job.loaded.warnings.clone();
+    let bare = |warning: &String| warning.trim_start_matches("warning: ").to_owned();
+    let mut warnings: Vec<String> = job.loaded.warnings.iter().map(bare).collect();
+    let opening = Instant::now();
+    let gpu = open(args, &mut warnings)?;
+    let opened = opening.elapsed();
     if let Some(path) = &args.dump_wgsl {
         let kernel = link(Stage::Path, &job.loaded.scene, &job.placement, &job.effects)?;
         write_file(path, kernel.wgsl.as_bytes())?;
     }
-    let opening = Instant::now();
-    let (mut renderer, backend, compile) = open(args, &job, &progress)?;
+    let backend = if gpu.is_some() { "gpu" } else { "cpu" };
+    let compiling = Instant::now();
+    let mut renderer = renderer(gpu, args, &job)?;
+    let compile = match backend {
+        "gpu" => compiling.elapsed(),
+        _ => Duration::ZERO,
+    };
     let setup = begin.elapsed().saturating_sub(compile);
     let (name, interface, driver) = renderer.device();
     if args.verbose {
         progress.message(&format!(
-            "device: {name} ({interface}, {driver}), open in {:.2?}",
-            opening.elapsed()
+            "device: {name} ({interface}, {driver}), open in {opened:.2?}"
         ));
         progress.message(&format!(
             "effects: {}",
@@ -62,13 +70,14 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
     for warning in &warnings {
         progress.warning(warning);
     }
+    let said = warnings.len();
 
     let mut watch = Display::new(&progress, &signals, &job.settings);
     let outcome = render(renderer.as_mut(), &job.settings, &mut watch);
     progress.finish();
 
     warnings.extend(observations(&outcome, &job.settings));
-    for warning in &warnings[job.loaded.warnings.len()..] {
+    for warning in &warnings[said..] {
         progress.warning(warning);
     }
     let stats = statistics(
@@ -149,41 +158,46 @@ fn prepare(args: &RenderArgs) -> Result<Job> {
     })
 }
 
-/// The renderer, what it is (`gpu` or `cpu`), and how long linking and compiling took.
-fn open(
-    args: &RenderArgs,
-    job: &Job,
-    progress: &Progress,
-) -> Result<(Box<dyn Renderer>, &'static str, Duration)> {
-    let Job {
-        loaded,
-        settings,
-        placement,
-        effects,
-        ..
-    } = job;
-    if args.backend != BackendArg::Cpu {
-        let choice = args
-            .device
-            .as_deref()
-            .map_or(DeviceChoice::Best, |text| text.parse().unwrap_or_default());
-        match device::open(&choice) {
-            Ok(gpu) => {
-                let begin = Instant::now();
-                let renderer = GpuRenderer::new(gpu, &loaded.scene, placement, effects, settings)?;
-                return Ok((Box::new(renderer), "gpu", begin.elapsed()));
-            }
-            Err(error) if args.backend == BackendArg::Gpu || args.device.is_some() => {
-                return Err(error);
-            }
-            Err(_) => progress.warning(&format!(
+/// The GPU to render on; `None` for the CPU reference.
+fn open(args: &RenderArgs, warnings: &mut Vec<String>) -> Result<Option<Gpu>> {
+    if args.backend == BackendArg::Cpu {
+        return Ok(None);
+    }
+    let choice = args
+        .device
+        .as_deref()
+        .map_or(DeviceChoice::Best, |text| text.parse().unwrap_or_default());
+    match device::open(&choice) {
+        Ok(gpu) => Ok(Some(gpu)),
+        // The user named it, so the user can name another.
+        Err(Error::Device(text)) if args.device.is_some() => {
+            Err(Error::Usage(format!("--device: {text}")))
+        }
+        Err(error) if args.backend == BackendArg::Gpu => Err(error),
+        Err(_) => {
+            warnings.push(format!(
                 "no usable GPU driver: rendering on the CPU reference, which is slower; {DRIVER_ADVICE}"
-            )),
+            ));
+            Ok(None)
         }
     }
-    let threads = args.threads.map_or(0, usize::from);
-    let renderer = ReferenceRenderer::new(&loaded.scene, placement, settings, threads)?;
-    Ok((Box::new(renderer), "cpu", Duration::ZERO))
+}
+
+fn renderer(gpu: Option<Gpu>, args: &RenderArgs, job: &Job) -> Result<Box<dyn Renderer>> {
+    let (scene, placement, settings) = (&job.loaded.scene, &job.placement, &job.settings);
+    Ok(match gpu {
+        Some(gpu) => Box::new(GpuRenderer::new(
+            gpu,
+            scene,
+            placement,
+            &job.effects,
+            settings,
+        )?),
+        None => {
+            let threads = args.threads.map_or(0, usize::from);
+            Box::new(ReferenceRenderer::new(scene, placement, settings, threads)?)
+        }
+    })
 }
 
 /// What the user should know about the outcome.

@@ -3,10 +3,11 @@
 use std::ops::Range;
 use std::time::Duration;
 
+use crate::scene::MAX_SIDE;
 use crate::settings::Rect;
 
-/// The largest side of an image: the sample stream packs a pixel into 32 bits.
-const SIDE: u32 = 65536;
+/// One past the largest sample index.
+const SAMPLES: u64 = 1 << 48;
 
 /// `1%` or `0.01`: a fraction above 0.
 pub(super) fn error(text: &str) -> Result<f64, String> {
@@ -22,8 +23,13 @@ pub(super) fn error(text: &str) -> Result<f64, String> {
         return Err("an error to reach is above 0; try 1% or 0.01".into());
     }
     if value >= 1.0 {
+        // Without a sign, percent were probably meant.
+        let meant = match text.ends_with('%') {
+            true => String::from("aim for less than 100%"),
+            false => format!("for {text} % write {text}%"),
+        };
         return Err(format!(
-            "{} % is no error to aim for; for {value} % write {value}%",
+            "{} % is no error to aim for; {meant}",
             value * 100.0
         ));
     }
@@ -32,13 +38,16 @@ pub(super) fn error(text: &str) -> Result<f64, String> {
 
 /// `30s`, `2m`, `1h 30m`, or a number of seconds.
 pub(super) fn time(text: &str) -> Result<Duration, String> {
+    let form = "try 30s, 2m, or a number of seconds";
     let seconds = text.parse::<f64>().ok().map(Duration::try_from_secs_f64);
     let duration = match seconds {
-        Some(duration) => duration.map_err(|e| e.to_string())?,
-        None => humantime::parse_duration(text).map_err(|e| format!("{e}; try 30s or 2m"))?,
+        Some(duration) => {
+            duration.map_err(|_| format!("no time that can be waited for; {form}"))?
+        }
+        None => humantime::parse_duration(text).map_err(|e| format!("{e}; {form}"))?,
     };
     if duration.is_zero() {
-        return Err("no time at all".into());
+        return Err(format!("no time at all; {form}"));
     }
     Ok(duration)
 }
@@ -46,11 +55,15 @@ pub(super) fn time(text: &str) -> Result<Duration, String> {
 /// A number of samples, at least 1.
 pub(super) fn count(text: &str) -> Result<u64, String> {
     match text.parse::<u64>() {
-        Ok(0) => Err("at least 1".into()),
-        Ok(n) if n > 1 << 48 => Err("at most 2^48".into()),
-        Ok(n) => Ok(n),
-        Err(e) => Err(e.to_string()),
+        Ok(n @ 1..=SAMPLES) => Ok(n),
+        _ => Err("a whole number from 1 to 2^48, as in 256".into()),
     }
+}
+
+/// A seed: any 64 bits.
+pub(super) fn seed(text: &str) -> Result<u64, String> {
+    text.parse()
+        .map_err(|_| "a whole number from 0 to 2^64 - 1".into())
 }
 
 /// `A..B`: from sample index A up to, not including, B.
@@ -62,7 +75,7 @@ pub(super) fn range(text: &str) -> Result<Range<u64>, String> {
     if range.is_empty() {
         return Err(format!("no sample lies in {text}; {form}"));
     }
-    if range.end > 1 << 48 {
+    if range.end > SAMPLES {
         return Err("sample indices go up to 2^48".into());
     }
     Ok(range)
@@ -70,15 +83,19 @@ pub(super) fn range(text: &str) -> Result<Range<u64>, String> {
 
 /// `WxH`, in pixels.
 pub(super) fn size(text: &str) -> Result<(u32, u32), String> {
-    let form = "write WIDTHxHEIGHT, as in 640x480";
+    extent(text, "write WIDTHxHEIGHT, as in 640x480")
+}
+
+/// A width and a height; `form` says how to write what they are part of.
+fn extent(text: &str, form: &str) -> Result<(u32, u32), String> {
     let (w, h) = text.split_once(['x', 'X', '×']).ok_or(form)?;
     let parse = |n: &str| n.trim().parse::<u32>().map_err(|_| form.to_owned());
     let (w, h) = (parse(w)?, parse(h)?);
     if w == 0 || h == 0 {
-        return Err("an image has at least one pixel".into());
+        return Err(format!("an image has at least one pixel; {form}"));
     }
-    if w > SIDE || h > SIDE {
-        return Err(format!("at most {SIDE} pixels a side"));
+    if w > MAX_SIDE || h > MAX_SIDE {
+        return Err(format!("at most {MAX_SIDE} pixels a side; {form}"));
     }
     Ok((w, h))
 }
@@ -94,7 +111,7 @@ pub(super) fn crop(text: &str) -> Result<Rect, String> {
             .ok_or_else(|| form.to_owned())
     };
     let (x, y) = (number()?, number()?);
-    let (width, height) = size(parts.next().ok_or(form)?.trim())?;
+    let (width, height) = extent(parts.next().ok_or(form)?.trim(), form)?;
     Ok(Rect {
         x,
         y,
@@ -107,8 +124,7 @@ pub(super) fn crop(text: &str) -> Result<Rect, String> {
 pub(super) fn termination(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(p) if (0.0..1.0).contains(&p) => Ok(p),
-        Ok(_) => Err("a probability of termination is at least 0 and below 1".into()),
-        Err(e) => Err(e.to_string()),
+        _ => Err("a probability from 0 to below 1, as in 0.2".into()),
     }
 }
 
@@ -116,8 +132,7 @@ pub(super) fn termination(text: &str) -> Result<f64, String> {
 pub(super) fn exposure(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(ev) if ev.abs() <= 100.0 => Ok(ev),
-        Ok(_) => Err("an exposure lies between -100 and 100 EV".into()),
-        Err(e) => Err(e.to_string()),
+        _ => Err("a number from -100 to 100, as in 1.5".into()),
     }
 }
 
@@ -133,6 +148,12 @@ mod tests {
         for wrong in ["", "%", "0", "-1%", "nan", "inf", "2", "150%", "one"] {
             assert!(error(wrong).is_err(), "{wrong}");
         }
+    }
+
+    #[test]
+    fn percent_is_suggested_where_it_was_meant() {
+        assert!(error("2").is_err_and(|text| text.contains("for 2 % write 2%")));
+        assert!(error("200%").is_err_and(|text| !text.contains("write")));
     }
 
     #[test]

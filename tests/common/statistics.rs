@@ -11,6 +11,11 @@ pub(crate) fn sidak(count: usize) -> f64 {
     -((-SIGNIFICANCE).ln_1p() / count as f64).exp_m1()
 }
 
+/// The size that none of `count` standard normal deviates exceeds, at [`SIGNIFICANCE`].
+pub(crate) fn normal_limit(count: usize) -> f64 {
+    Normal::standard().inverse_cdf(1.0 - 0.5 * sidak(count))
+}
+
 /// Two-sided p-value of a standard normal deviate.
 pub(crate) fn normal_p(z: f64) -> f64 {
     2.0 * Normal::standard().sf(z.abs())
