@@ -16,7 +16,7 @@ pub const WINDOW: u64 = 256;
 #[must_use]
 pub fn window_end(start: u64, end: u64) -> u64 {
     let boundary = [16, 64].into_iter().find(|b| start < *b);
-    let boundary = boundary.unwrap_or((start / WINDOW + 1) * WINDOW);
+    let boundary = boundary.unwrap_or((start / WINDOW + 1).saturating_mul(WINDOW));
     // A window's samples share the high word of the sample index.
     boundary.min(end)
 }

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use crate::reference::core::random::mix_bits;
 use crate::scene::Scene;
 
 /// Samples a pixel where neither the command line nor the scene says.
@@ -137,11 +138,9 @@ pub enum GeometryChoice {
 /// stream (`shaders/core/random.wesl`).
 #[must_use]
 pub fn stream_words(seed: u64, sample_high: u32) -> [u32; 2] {
-    let v = crate::reference::core::random::pcg4d([
-        seed as u32,
-        (seed >> 32) as u32,
-        sample_high,
-        0x5eed,
-    ]);
-    [v[0], v[1]]
+    // A round for each of the three words, so that every bit of them reaches both results.
+    [0x5eed_0001, 0x5eed_0002].map(|word| {
+        let mixed = mix_bits(mix_bits(word, seed as u32), (seed >> 32) as u32);
+        mix_bits(mixed, sample_high)
+    })
 }

@@ -116,18 +116,22 @@ fn fixed_structs_agree() {
         region_size,
         first_tile,
         end_tile,
-        first_sample,
-        end_sample,
         window_start,
-        unused,
+        end_sample,
         stream,
+        fresh,
+        step_limit,
+        zero,
+        unused,
     });
     check("Dispatch", &dispatch, &kernel);
     let counters = host!(CountersRecord {
         non_finite,
         first_pixel,
         sample_low,
-        bounce
+        bounce,
+        unfinished,
+        advanced,
     });
     check("Counters", &counters, &kernel);
 }
@@ -138,7 +142,7 @@ fn the_probes_shape_agrees() {
         count,
         inputs,
         outputs,
-        unused
+        zero
     });
     check("Shape", &shape, &kernel(Stage::Probe, &[]));
 }

@@ -141,7 +141,7 @@ fn values_at_the_ends_of_their_ranges_are_legal() {
         [0.9, 0.8, 0.7] | [0, 1, 0.5]
         width = 64 | width = 65_536
         width = 64 | width = 0x40
-        spp = 16 | spp = 4294967295
+        spp = 16 | spp = 281474976710656
         max_bounces = 8 | max_bounces = 0
         priority = 2 | priority = -2147483648
         aperture_radius = 0.1\nfocus_distance = 4.0 | aperture_radius = 0
@@ -189,7 +189,7 @@ fn numbers_outside_of_their_range_are_refused() {
         focus_distance = 4.0 | focus_distance = 0 | 8:18 | greater than 0
         width = 64 | width = 0 | 10:9 | an integer in [1, 65536]
         height = 48 | height = 65537 | 11:10 | an integer in [1, 65536]
-        spp = 16 | spp = 0 | 13:7 | an integer in [1, 4294967295]
+        spp = 16 | spp = 0 | 13:7 | an integer in [1, 281474976710656]
         spp = 16 | spp = -1 | 13:7 | ^^ negative
         max_bounces = 8 | max_bounces = -1 | 14:15 | integer in [0, 65535]
         max_bounces = 8 | max_bounces = 99999999999999999999 | 14:15 | too large

@@ -4,7 +4,7 @@ mod common;
 
 use common::statistics::{SIGNIFICANCE, correlation, sidak, uniform_ks};
 use common::{Random, probe};
-use gpu_trace::reference::core::random::{pcg4d, random4, unit_float};
+use gpu_trace::reference::core::random::{mix_bits, sample_key, unit_float};
 use gpu_trace::settings::stream_words;
 
 /// Where, and which: the two rows of the probe's `random4`.
@@ -69,6 +69,12 @@ fn differences(keys: &[Key], host: impl Fn(&Key) -> [f64; 4]) -> usize {
         .count()
 }
 
+/// The stream as one function of all that it depends on.
+fn random4(stream: [u32; 2], pixel: [u32; 2], sample_low: u32, dimension: u32) -> [f64; 4] {
+    let key = sample_key(stream, pixel, sample_low);
+    gpu_trace::reference::core::random::random4(key, dimension)
+}
+
 #[test]
 fn the_stream_has_the_same_bits_on_device_and_host() {
     let keys = keys();
@@ -77,14 +83,16 @@ fn the_stream_has_the_same_bits_on_device_and_host() {
 }
 
 #[test]
-fn pcg4d_has_the_same_bits_on_device_and_host() {
-    let mut random = Random::new("pcg4d");
-    let keys: Vec<[u32; 4]> = (0..100_000).map(|_| random.words()).collect();
-    let device: Vec<[u32; 4]> = probe(&[]).call("pcg4d", &keys).expect("the probe runs");
+fn mix_bits_has_the_same_bits_on_device_and_host() {
+    let mut random = Random::new("mix_bits");
+    let keys: Vec<Key> = (0..100_000)
+        .map(|_| [random.words(), random.words()])
+        .collect();
+    let device: Vec<[u32; 4]> = probe(&[]).call("mix_bits", &keys).expect("the probe runs");
     let wrong = keys
         .iter()
         .zip(&device)
-        .filter(|(k, d)| pcg4d(**k) != **d)
+        .filter(|([words, key], d)| words.map(|w| mix_bits(w, key[0])) != **d)
         .count();
     assert_eq!(wrong, 0);
 }
@@ -214,7 +222,7 @@ fn neighbours_are_uncorrelated() {
 
 #[test]
 fn companion_a_weak_hash_is_correlated() {
-    // One multiplication instead of PCG4D.
+    // One multiplication instead of two, and shifts.
     let weak = |p: [u32; 2], s: u32, d: u32| {
         let key = p[0].wrapping_mul(1_664_525) ^ p[1].wrapping_mul(22_695_477) ^ s ^ d << 8;
         unit_float([

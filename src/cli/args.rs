@@ -83,17 +83,20 @@ pub struct RenderArgs {
     pub verbose: bool,
 
     #[arg(
-        long, value_name = "N", value_parser = values::count, allow_negative_numbers = true, help_heading = "How long",
+        long, value_name = "N", value_parser = values::count, allow_negative_numbers = true,
+        help_heading = "How long",
         help = "Samples a pixel [default: the scene's, or 256]"
     )]
     pub spp: Option<u64>,
     #[arg(
-        long, value_name = "P", value_parser = values::error, allow_negative_numbers = true, help_heading = "How long",
+        long, value_name = "P", value_parser = values::error, allow_hyphen_values = true,
+        help_heading = "How long",
         help = "Stop at this estimated error: 1% or 0.01"
     )]
     pub error: Option<f64>,
     #[arg(
-        long, value_name = "TIME", value_parser = values::time, allow_negative_numbers = true, help_heading = "How long",
+        long, value_name = "TIME", value_parser = values::time, allow_hyphen_values = true,
+        help_heading = "How long",
         help = "Stop after this time: 30s, 2m, 1h; whichever of --spp, --error and --time comes first"
     )]
     pub time: Option<Duration>,
@@ -164,7 +167,8 @@ pub struct RenderArgs {
     )]
     pub roulette: Option<OnOff>,
     #[arg(
-        long, value_name = "P", value_parser = values::termination, allow_negative_numbers = true, help_heading = "Light transport",
+        long, value_name = "P", value_parser = values::termination, allow_negative_numbers = true,
+        help_heading = "Light transport",
         help = "Probability that the lecture's estimator ends at a vertex [default: 0.2]"
     )]
     pub termination: Option<f64>,

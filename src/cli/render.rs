@@ -22,7 +22,7 @@ use crate::reference::path::ReferenceRenderer;
 use crate::render::{Outcome, Renderer, Status, StoppedBy, Watch, render};
 use crate::scene::builtin;
 use crate::scene::load::Loaded;
-use crate::settings::{MAXIMUM_SPP, Settings};
+use crate::settings::{MAXIMUM_SPP, Rect, Settings};
 use crate::shader::{Stage, link};
 
 /// Everything about a render that is decided before a device is touched.
@@ -141,6 +141,7 @@ fn prepare(args: &RenderArgs) -> Result<Job> {
         .map(Path::new)
         .filter(|path| path.is_file());
     check_all(&outputs, scene_file.as_slice())?;
+    check_memory(&settings.crop)?;
     let placement = Placement::new(&loaded.scene, settings.width, settings.height);
     if placement.media.levels > MAX_LEVELS {
         return Err(Error::Scene(format!(
@@ -156,6 +157,28 @@ fn prepare(args: &RenderArgs) -> Result<Job> {
         effects,
         targets,
     })
+}
+
+/// Bytes of memory that a pixel takes: 48 each in film and window, and room for the files.
+const PIXEL_BYTES: usize = 128;
+
+/// Refuses an image that would end the program in the middle for want of memory.
+fn check_memory(crop: &Rect) -> Result<()> {
+    let bytes = crop.pixels().saturating_mul(PIXEL_BYTES);
+    let mut room: Vec<u8> = Vec::new();
+    let there = room.try_reserve_exact(bytes).is_ok();
+    // Without this, the compiler may leave the allocation out and assume that it works.
+    std::hint::black_box(&room);
+    if there {
+        return Ok(());
+    }
+    Err(Error::Usage(format!(
+        "{}x{} pixels need {:.1} GiB of memory, more than there is: choose a smaller --size, or \
+         render parts of the image with --crop",
+        crop.width,
+        crop.height,
+        bytes as f64 / f64::from(1 << 30),
+    )))
 }
 
 /// The GPU to render on; `None` for the CPU reference.

@@ -3,11 +3,11 @@
 use std::ops::Range;
 use std::time::Duration;
 
-use crate::scene::MAX_SIDE;
+use crate::scene::{MAX_SIDE, MAX_SPP};
 use crate::settings::Rect;
 
 /// One past the largest sample index.
-const SAMPLES: u64 = 1 << 48;
+const SAMPLES: u64 = MAX_SPP;
 
 /// `1%` or `0.01`: a fraction above 0.
 pub(super) fn error(text: &str) -> Result<f64, String> {

@@ -114,16 +114,20 @@ pub struct DispatchRecord {
     pub first_tile: u32,
     /// One past the last tile.
     pub end_tile: u32,
-    /// Low word of the first sample index.
-    pub first_sample: u32,
-    /// One past the last.
-    pub end_sample: u32,
     /// Low word of the first sample index of the window.
     pub window_start: u32,
-    /// Padding.
-    pub unused: u32,
+    /// Low word of the sample index to stop at.
+    pub end_sample: u32,
     /// See [`crate::settings::stream_words`].
     pub stream: [u32; 2],
+    /// 1 where the window begins: there is nothing to continue.
+    pub fresh: u32,
+    /// Loop iterations after which an invocation starts no further path.
+    pub step_limit: u32,
+    /// Always 0, which no shader compiler knows.
+    pub zero: u32,
+    /// Padding.
+    pub unused: u32,
 }
 
 /// `Counters` of `shaders/path.wesl`.
@@ -138,6 +142,10 @@ pub struct CountersRecord {
     pub sample_low: u32,
     /// Bounce at which it was seen.
     pub bounce: u32,
+    /// Pixels of the last dispatch that did not reach its end.
+    pub unfinished: u32,
+    /// Samples that the last dispatch finished.
+    pub advanced: u32,
 }
 
 /// All that a kernel may want to know of a material, rounded to f32.

@@ -32,8 +32,8 @@ pub struct ShapeRecord {
     pub inputs: u32,
     /// Rows that it writes.
     pub outputs: u32,
-    /// Padding.
-    pub unused: u32,
+    /// Always 0, which no shader compiler knows.
+    pub zero: u32,
 }
 
 /// The kernel's functions, ready to be called.
@@ -168,7 +168,7 @@ impl Probe {
             count: inputs.len() as u32,
             inputs: (size_of::<I>() / ROW) as u32,
             outputs: (size_of::<O>() / ROW) as u32,
-            unused: 0,
+            zero: 0,
         };
         let upload = |label, contents: &[u8], usage| {
             device.create_buffer_init(&wgpu::util::BufferInitDescriptor {

@@ -1,5 +1,6 @@
 //! The GPU renderer: dispatches sized by time, sums continued in the order of the sample index.
 
+use std::mem::offset_of;
 use std::ops::Range;
 use std::time::{Duration, Instant};
 
@@ -17,7 +18,7 @@ use crate::placement::Placement;
 use crate::render::{Control, Renderer};
 use crate::scene::Scene;
 use crate::settings::{Integrator, Rect, Settings, stream_words};
-use crate::shader::{Kernel, Stage, link};
+use crate::shader::{Kernel, LOOP_ITERATIONS, Stage, link, ray_steps};
 
 /// Pixels along the side of the kernel's tile.
 const TILE: u32 = 8;
@@ -29,6 +30,25 @@ const DISPATCH: Duration = Duration::from_millis(75);
 const SLAB: Duration = Duration::from_millis(2000);
 /// Tiles that keep a GPU busy: below that a dispatch takes fewer samples instead.
 const BUSY_TILES: u32 = 64;
+
+/// The most that one dispatch may do, whatever the time it would take. No bit of an image depends on
+/// it; it is for tests of just that, and for drivers with a short watchdog.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct DispatchLimits {
+    /// Tiles of 8 x 8 pixels; at least 1.
+    pub tiles: u32,
+    /// Samples a pixel; rounded up to whole blocks.
+    pub samples: u64,
+}
+
+impl Default for DispatchLimits {
+    fn default() -> Self {
+        Self {
+            tiles: u32::MAX,
+            samples: u64::MAX,
+        }
+    }
+}
 
 /// Renders windows on a GPU.
 #[derive(Debug)]
@@ -44,6 +64,9 @@ pub struct GpuRenderer {
     region: RegionTargets,
     /// Paths a second, from the last dispatch.
     rate: f64,
+    limits: DispatchLimits,
+    /// Loop iterations after which an invocation starts no further path.
+    step_limit: u32,
 }
 
 /// Textures that the kernel writes and buffers through which they are read.
@@ -163,6 +186,9 @@ impl GpuRenderer {
             entries: &entries,
         });
         gpu.check()?;
+        // A path that is begun must fit.
+        let path = (u64::from(settings.max_bounces) + 1) * u64::from(ray_steps(placement, effects));
+        let step_limit = LOOP_ITERATIONS.saturating_sub(path).max(1) as u32;
         let mut renderer = Self {
             gpu,
             kernel,
@@ -174,11 +200,20 @@ impl GpuRenderer {
             counters,
             region,
             rate: 1.0e6,
+            limits: DispatchLimits::default(),
+            step_limit,
         };
         // Some drivers compile at the first dispatch: one that does nothing takes that out of the
         // rendering's time.
         renderer.dispatch(&DispatchRecord::zeroed(), 1)?;
         Ok(renderer)
+    }
+
+    /// The same renderer with smaller dispatches.
+    #[must_use]
+    pub fn with_limits(mut self, limits: DispatchLimits) -> Self {
+        self.limits = limits;
+        self
     }
 
     /// The kernel in use.
@@ -203,6 +238,54 @@ impl GpuRenderer {
         self.gpu.wait()
     }
 
+    /// Dispatches until every pixel of the tiles has reached the end: a pixel stops early where it
+    /// would run into a driver's limit on loop iterations.
+    fn finish_tiles(&mut self, mut record: DispatchRecord) -> Result<()> {
+        let tiles = record.end_tile - record.first_tile;
+        loop {
+            self.dispatch(&record, tiles)?;
+            let counters = self.counters()?;
+            if counters.unfinished == 0 {
+                return Ok(());
+            }
+            if counters.advanced == 0 {
+                return Err(Error::Gpu(format!(
+                    "{}: {} pixels make no progress: a path takes more loop iterations than the \
+                     driver allows. Lower --max-bounces, or use --backend cpu",
+                    self.gpu.summary.name, counters.unfinished
+                )));
+            }
+            record.fresh = 0;
+        }
+    }
+
+    /// Reads the counters of the last dispatch.
+    fn counters(&self) -> Result<CountersRecord> {
+        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+        let size = size_of::<CountersRecord>() as u64;
+        encoder.copy_buffer_to_buffer(&self.counters, 0, &self.region.counters, 0, size);
+        let of_dispatch = offset_of!(CountersRecord, unfinished) as u64;
+        encoder.clear_buffer(&self.counters, of_dispatch, None);
+        self.gpu.queue.submit([encoder.finish()]);
+        let buffer = &self.region.counters;
+        // Whether it worked shows when the range is taken.
+        buffer.map_async(wgpu::MapMode::Read, .., |_| ());
+        self.gpu.wait()?;
+        let counters = {
+            let bytes = buffer.get_mapped_range(..).map_err(|e| self.lost(&e))?;
+            *bytemuck::from_bytes(&bytes)
+        };
+        buffer.unmap();
+        Ok(counters)
+    }
+
+    fn lost(&self, error: &dyn std::fmt::Display) -> Error {
+        Error::Gpu(format!(
+            "{}: no data came back: {error}",
+            self.gpu.summary.name
+        ))
+    }
+
     /// Renders `samples` of `region`, or fewer if it may stop and `control` says so between two
     /// slabs; returns the end that was reached.
     fn render_region(
@@ -218,12 +301,13 @@ impl GpuRenderer {
             region_size: [region.width, region.height],
             window_start: samples.start as u32,
             stream: stream_words(self.seed, (samples.start >> 32) as u32),
+            step_limit: self.step_limit,
             ..DispatchRecord::zeroed()
         };
         let mut start = samples.start;
         while start < samples.end {
             let end = self.slab_end(start..samples.end, region.pixels() as f64);
-            record.first_sample = start as u32;
+            record.fresh = u32::from(start == samples.start);
             record.end_sample = end as u32;
             let mut proceed = true;
             let mut first = 0;
@@ -232,7 +316,7 @@ impl GpuRenderer {
                 record.first_tile = first;
                 record.end_tile = first + count;
                 let before = Instant::now();
-                self.dispatch(&record, count)?;
+                self.finish_tiles(record)?;
                 let paths = f64::from(count) * f64::from(TILE * TILE) * (end - start) as f64;
                 self.rate = paths / before.elapsed().as_secs_f64().max(1.0e-6);
                 first += count;
@@ -256,17 +340,17 @@ impl GpuRenderer {
         let parts = (left as f64 / fit.min(busy.max(BLOCK as f64)))
             .ceil()
             .max(1.0);
-        let length = (left as f64 / parts).ceil() as u64;
+        let length = ((left as f64 / parts).ceil() as u64).min(self.limits.samples);
         // Slabs end where blocks do.
         (samples.start + length)
-            .next_multiple_of(BLOCK)
-            .min(samples.end)
+            .checked_next_multiple_of(BLOCK)
+            .map_or(samples.end, |end| end.min(samples.end))
     }
 
     fn tile_count(&self, samples: u64) -> u32 {
         let paths = self.rate * DISPATCH.as_secs_f64();
         let count = paths / (f64::from(TILE * TILE) * samples as f64);
-        (count as u32).max(1)
+        (count as u32).min(self.limits.tiles).max(1)
     }
 
     /// Reads back what the kernel left for `region`.
@@ -291,16 +375,12 @@ impl GpuRenderer {
                 },
             );
         }
-        let size = size_of::<CountersRecord>() as u64;
-        encoder.copy_buffer_to_buffer(&self.counters, 0, &self.region.counters, 0, size);
-        encoder.clear_buffer(&self.counters, 0, None);
         self.gpu.queue.submit([encoder.finish()]);
-        for buffer in self.region.staging.iter().chain([&self.region.counters]) {
+        for buffer in &self.region.staging {
             // Whether it worked shows when the range is taken.
             buffer.map_async(wgpu::MapMode::Read, .., |_| ());
         }
         self.gpu.wait()?;
-        let lost = |e| Error::Gpu(format!("{}: no data came back: {e}", self.gpu.summary.name));
         let mut pixels = vec![PixelSums::default(); region.pixels()];
         let mut tally = Tally::default();
         {
@@ -310,9 +390,9 @@ impl GpuRenderer {
                 .each_ref()
                 .map(|b| b.get_mapped_range(..));
             let (high, low, deviation) = (
-                high.map_err(lost)?,
-                low.map_err(lost)?,
-                deviation.map_err(lost)?,
+                high.map_err(|e| self.lost(&e))?,
+                low.map_err(|e| self.lost(&e))?,
+                deviation.map_err(|e| self.lost(&e))?,
             );
             for y in 0..region.height {
                 let row = (y * stride) as usize..;
@@ -331,24 +411,28 @@ impl GpuRenderer {
                     tally.cut_paths += deviation[x][3] as u64;
                 }
             }
-            let counters = self.region.counters.get_mapped_range(..).map_err(lost)?;
-            let counters: CountersRecord = *bytemuck::from_bytes(&counters);
-            if counters.non_finite > 0 {
-                let number = u32::MAX - counters.first_pixel;
-                tally.non_finite = u64::from(counters.non_finite);
-                tally.first_non_finite = Some(NonFinite {
-                    pixel: [
-                        region.x + number % region.width,
-                        region.y + number / region.width,
-                    ],
-                    sample: (samples.start >> 32 << 32) + u64::from(counters.sample_low),
-                    bounce: counters.bounce,
-                });
-            }
         }
-        for buffer in self.region.staging.iter().chain([&self.region.counters]) {
+        for buffer in &self.region.staging {
             buffer.unmap();
         }
+        let counters = self.counters()?;
+        if counters.non_finite > 0 {
+            let number = u32::MAX - counters.first_pixel;
+            tally.non_finite = u64::from(counters.non_finite);
+            tally.first_non_finite = Some(NonFinite {
+                pixel: [
+                    region.x + number % region.width,
+                    region.y + number / region.width,
+                ],
+                sample: (samples.start >> 32 << 32) + u64::from(counters.sample_low),
+                bounce: counters.bounce,
+            });
+        }
+        self.gpu.queue.write_buffer(
+            &self.counters,
+            0,
+            bytemuck::bytes_of(&CountersRecord::zeroed()),
+        );
         self.gpu.check()?;
         Ok((pixels, tally))
     }

@@ -6,7 +6,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::bsdf::scatter::scatter;
-use super::core::random::random4;
+use super::core::random::{random4, sample_key};
 use super::light::environment_radiance;
 use super::scene::camera::camera_ray;
 use super::scene::priority::{cross_surface, relative_index};
@@ -18,6 +18,12 @@ use crate::placement::Placement;
 use crate::render::{Control, Renderer};
 use crate::scene::{MaterialKind, Scene};
 use crate::settings::{Integrator, Rect, Settings, stream_words};
+
+/// Survival is the largest component of the throughput over 1/2.
+#[must_use]
+pub fn roulette_survival(largest: f64) -> f64 {
+    (2.0 * largest).min(1.0)
+}
 
 /// What one path found.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -53,7 +59,8 @@ impl PathTracer<'_> {
             settings,
         } = self;
         let stream = stream_words(settings.seed, (sample >> 32) as u32);
-        let random = |dimension| random4(stream, pixel, sample as u32, dimension);
+        let key = sample_key(stream, pixel, sample as u32);
+        let random = |dimension| random4(key, dimension);
         let lecture = matches!(settings.integrator, Integrator::Lecture { .. });
         let mut ray = camera_ray(&placement.camera, pixel, random(0));
         let mut result = PathResult::default();
@@ -93,7 +100,7 @@ impl PathTracer<'_> {
             let largest = (throughput * compression).max_element();
             let survival = match settings.integrator {
                 Integrator::Lecture { termination } => 1.0 - termination,
-                Integrator::Bsdf if settings.roulette => largest.min(1.0),
+                Integrator::Bsdf if settings.roulette => roulette_survival(largest),
                 Integrator::Bsdf => 1.0,
             };
             if largest <= 0.0 || u[3] >= survival {
@@ -231,7 +238,9 @@ impl Renderer for ReferenceRenderer {
         let mut start = samples.start;
         while start < samples.end {
             // A block at a time over the whole image: then it can stop.
-            let end = (start / BLOCK * BLOCK + BLOCK).min(samples.end);
+            let end = (start / BLOCK * BLOCK)
+                .saturating_add(BLOCK)
+                .min(samples.end);
             self.threads.install(|| {
                 state
                     .par_chunks_mut(width)

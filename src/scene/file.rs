@@ -17,8 +17,8 @@ use toml::Spanned;
 pub const MAX_MAGNITUDE: f64 = 1e20;
 /// The largest width and height of an image, in pixels.
 pub const MAX_SIDE: u32 = 65_536;
-/// The largest number of samples a pixel: a sample's index is a 32-bit integer in the kernel.
-pub const MAX_SPP: u64 = u32::MAX as u64;
+/// The largest number of samples a pixel, and the largest sample index.
+pub const MAX_SPP: u64 = 1 << 48;
 /// The largest number of bounces of a path: far more than any path survives roulette for.
 pub const MAX_BOUNCES: u32 = 65_535;
 

@@ -103,6 +103,10 @@ pub fn link(
         .compile(&module_path(root))
         .map_err(|e| Error::Shader(format!("the kernel does not link: {e}")))?
         .to_string();
+    // The linker's order varies from run to run; declarations may stand in any.
+    let mut declarations: Vec<&str> = wgsl.split("\n\n").map(str::trim).collect();
+    declarations.sort_unstable();
+    let wgsl = declarations.join("\n\n") + "\n";
     let module = validate(&wgsl)?;
     Ok(Kernel { wgsl, module })
 }
@@ -138,6 +142,21 @@ fn module_path(path: &str) -> ModulePath {
         .expect("a literal path of this crate")
 }
 
+/// The most loop iterations of an invocation in one dispatch: llvmpipe, lavapipe's machine, ends
+/// every loop in silence after 65535 iterations of all loops together.
+pub const LOOP_ITERATIONS: u64 = 65_000;
+
+/// Loop iterations that the kernel makes for one ray.
+#[must_use]
+pub fn ray_steps(placement: &Placement, effects: &Effects) -> u32 {
+    if effects.has("baked") {
+        return 1;
+    }
+    let others = placement.spheres.len() - placement.poles;
+    // The path loop's own, one a pole sphere, one for eight others, and one to leave each loop.
+    (placement.poles + others.div_ceil(8) + 3) as u32
+}
+
 /// The module `config`: sizes and constants of this scene.
 fn config(scene: &Scene, placement: &Placement, effects: &Effects) -> String {
     let mut text = String::new();
@@ -147,6 +166,10 @@ fn config(scene: &Scene, placement: &Placement, effects: &Effects) -> String {
             text += &format!("const POLE_COUNT: u32 = {}u;\n", placement.poles);
         }
     }
+    text += &format!(
+        "const RAY_STEPS: u32 = {}u;\n",
+        ray_steps(placement, effects)
+    );
     if effects.has("environment") {
         let radiance = scene.environment.unwrap_or_default();
         text += &format!("const ENVIRONMENT: vec3f = {};\n", baked::vector(radiance));

@@ -21,6 +21,10 @@ use gpu_trace::settings::{Rect, Settings};
 /// Unit roundoff of f32.
 pub(crate) const U: f64 = 1.0 / (1 << 24) as f64;
 
+/// Largest relative error of one f32 addition or multiplication: WGSL leaves the direction of
+/// rounding open. Division has 2.5 of these, inverseSqrt 2, sqrt 4.5 (WGSL 15.7.4).
+pub(crate) const ULP: f64 = 2.0 * U;
+
 /// A row of the probe.
 pub(crate) type Row = [f32; 4];
 
@@ -173,7 +177,7 @@ impl Random {
     /// Four random words.
     pub(crate) fn words(&mut self) -> [u32; 4] {
         self.key[1] += 1;
-        gpu_trace::reference::core::random::pcg4d(self.key)
+        gpu_trace::reference::core::random::random_words([self.key[0], !self.key[0]], self.key[1])
     }
 
     /// Four uniform numbers in [0, 1) with 24 bits, as the kernel has them.
@@ -196,5 +200,69 @@ impl Random {
         let u = self.unit4();
         let u = glam::DVec2::new(f64::from(u[0]), f64::from(u[1]));
         gpu_trace::reference::core::sampling::sphere_direction(u)
+    }
+}
+
+/// A vector of a row's first three numbers.
+pub(crate) fn vector(row: Row) -> glam::DVec3 {
+    glam::DVec3::new(f64::from(row[0]), f64::from(row[1]), f64::from(row[2]))
+}
+
+/// A row of a vector and a fourth number, rounded to f32.
+pub(crate) fn to_row(v: glam::DVec3, w: f64) -> Row {
+    [v.x as f32, v.y as f32, v.z as f32, w as f32]
+}
+
+/// Errors of many cases, each in units of its own tolerance.
+#[derive(Debug, Default)]
+pub(crate) struct Agreement {
+    cases: usize,
+    beyond: usize,
+    worst: f64,
+    place: String,
+}
+
+impl Agreement {
+    /// Takes note of a case; no number is an error without bound.
+    pub(crate) fn add(&mut self, error: f64, tolerance: f64, place: impl FnOnce() -> String) {
+        let ratio = error / tolerance;
+        let ratio = if ratio.is_nan() { f64::INFINITY } else { ratio };
+        self.cases += 1;
+        self.beyond += usize::from(ratio > 1.0);
+        if ratio > self.worst {
+            self.worst = ratio;
+            self.place = format!("error {error:e}, tolerance {tolerance:e}: {}", place());
+        }
+    }
+
+    /// Fails unless all of at least `least` cases are within their tolerances.
+    pub(crate) fn assert_holds(&self, least: usize) {
+        assert!(self.cases >= least, "{} cases, {least} wanted", self.cases);
+        assert!(
+            self.beyond == 0,
+            "{} of {} cases are off, by up to {} times the tolerance; {}",
+            self.beyond,
+            self.cases,
+            self.worst,
+            self.place
+        );
+        eprintln!(
+            "{} cases, worst {:.3} of the tolerance",
+            self.cases, self.worst
+        );
+    }
+
+    /// For companions: whether any case is off.
+    pub(crate) fn any_fails(&self) -> bool {
+        self.beyond > 0
+    }
+
+    /// For companions: fails unless at least half of the cases are off.
+    pub(crate) fn assert_fails(&self) {
+        let (beyond, cases) = (self.beyond, self.cases);
+        assert!(
+            cases > 0 && 2 * beyond >= cases,
+            "only {beyond} of {cases} cases are off"
+        );
     }
 }

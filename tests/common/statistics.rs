@@ -33,7 +33,7 @@ pub(crate) struct ChiSquare {
 }
 
 /// Counts against expected probabilities, which sum to 1. Cells with fewer than 5 expected counts
-/// are pooled into one; what lies in cells of no probability makes the test fail.
+/// are pooled into one; if that has fewer too, more than 20 unexpected counts make the test fail.
 pub(crate) fn chi_square(counts: &[u64], probabilities: &[f64]) -> ChiSquare {
     assert_eq!(counts.len(), probabilities.len());
     let total: f64 = probabilities.iter().sum();

@@ -1,4 +1,130 @@
-//! `cargo xtask bench`.
-pub(crate) fn all(_: &[String]) -> Result<(), String> {
-    crate::run(crate::cargo().args(["bench", "--bench", "speed"]))
+//! `cargo xtask bench`: the benchmarks, as ratios of things that run side by side.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use crate::{cargo, run};
+
+const USAGE: &str = "\
+Usage: cargo xtask bench [TABLE...]
+
+  naive      the kernel against a plain one
+  unused     effects that a scene does not use
+  geometry   spheres as constants or in a buffer
+  resources  time to the first window, peak memory
+  peers      Mitsuba 3 on the same scene (installs it into target/peers with pip)
+
+Without a name: all but peers. Run it on an idle machine.
+";
+
+/// Runs the benchmarks named in `tables`.
+pub(crate) fn all(tables: &[String]) -> Result<(), String> {
+    const KNOWN: [&str; 5] = ["naive", "unused", "geometry", "resources", "peers"];
+    if tables.iter().any(|t| t == "--help" || t == "-h") {
+        print!("{USAGE}");
+        return Ok(());
+    }
+    if let Some(unknown) = tables.iter().find(|t| !KNOWN.contains(&t.as_str())) {
+        return Err(format!("no benchmark '{unknown}'\n\n{USAGE}"));
+    }
+    let chosen = |name: &str| tables.is_empty() || tables.iter().any(|t| t == name);
+    run(cargo().args(["build", "--release"]))?;
+    let in_process: Vec<&str> = KNOWN[..3]
+        .iter()
+        .copied()
+        .filter(|name| chosen(name))
+        .collect();
+    if !in_process.is_empty() {
+        run(cargo()
+            .args(["bench", "--bench", "speed", "--"])
+            .args(in_process)
+            .env("NODEVICE_SELECT", "1"))?;
+    }
+    if chosen("resources") {
+        resources()?;
+    }
+    if tables.iter().any(|t| t == "peers") {
+        peers()?;
+    }
+    Ok(())
+}
+
+/// The program, as cargo has built it.
+fn program() -> PathBuf {
+    let target =
+        std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| "target".into(), PathBuf::from);
+    target.join("release/gpu-trace")
+}
+
+/// Time from launch to an image of the first window (16 samples), and peak memory of a render.
+fn resources() -> Result<(), String> {
+    let folder = std::env::temp_dir().join(format!("gpu-trace-bench-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).map_err(|e| e.to_string())?;
+    let image = folder.join("image.exr");
+    let render = |spp: &str| {
+        let mut command = Command::new(program());
+        command
+            .args(["lecture", "--quiet", "--spp", spp, "-o"])
+            .arg(&image);
+        command
+    };
+    let mut times: Vec<f64> = Vec::new();
+    for _ in 0..5 {
+        let begin = std::time::Instant::now();
+        run(&mut render("16"))?;
+        times.push(begin.elapsed().as_secs_f64());
+    }
+    times.sort_by(f64::total_cmp);
+    println!("| `lecture`, 640x640 | |\n|---|---|");
+    println!(
+        "| launch to an image of the first window (16 spp), median of 5 | {:.2} s |",
+        times[2]
+    );
+    match peak_memory(&mut render("256")) {
+        Some(kib) => println!(
+            "| peak memory of a 256 spp render | {} MB |",
+            kib * 1024 / 1_000_000
+        ),
+        None => println!("| peak memory | not known on this system |"),
+    }
+    println!();
+    std::fs::remove_dir_all(&folder).map_err(|e| e.to_string())
+}
+
+/// The largest resident size in KiB that Linux reports of a child while it runs.
+fn peak_memory(command: &mut Command) -> Option<u64> {
+    let mut child = command.spawn().ok()?;
+    let status = format!("/proc/{}/status", child.id());
+    let mut peak = None;
+    while child.try_wait().ok()?.is_none() {
+        let text = std::fs::read_to_string(&status).unwrap_or_default();
+        let line = text.lines().find(|line| line.starts_with("VmHWM:"));
+        let kib = line.and_then(|line| line.split_whitespace().nth(1)?.parse::<u64>().ok());
+        peak = peak.max(kib);
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    peak
+}
+
+/// Installs Mitsuba into an environment of its own and takes turns with it.
+fn peers() -> Result<(), String> {
+    let environment = Path::new("target/peers");
+    let python = environment.join("bin/python");
+    if !python.exists() {
+        run(Command::new("python3")
+            .args(["-m", "venv"])
+            .arg(environment))?;
+    }
+    run(Command::new(&python).args([
+        "-m",
+        "pip",
+        "install",
+        "--quiet",
+        "mitsuba==3.9.1",
+        "numpy",
+    ]))?;
+    run(Command::new(&python)
+        .arg("benches/peers/side_by_side.py")
+        .arg(program())
+        .env("NODEVICE_SELECT", "1"))
 }

@@ -1,0 +1,204 @@
+//! GPU images against the CPU reference: f32 against f64 on the same paths.
+//!
+//! Both renderers use the same sample stream, so that most pixels agree to rounding and the
+//! difference of two images has a small variance of its own. Two tests an image: the pooled paired
+//! z of the mean (|z| < 3.9), and equivalence: the 99 % interval of the bias lies within 0.1 % of the
+//! mean. Power: a scene whose albedos are 1 % off fails (the companion).
+
+mod common;
+
+use std::path::Path;
+
+use common::statistics::mean_and_error;
+use common::{image_bits, means, render_cpu, render_gpu, scene_file, scene_files, settings};
+use gpu_trace::film::Film;
+use gpu_trace::scene::{MaterialKind, Scene};
+use gpu_trace::settings::{GeometryChoice, Integrator, Settings};
+
+/// Bound of the bias of the mean, relative.
+const EQUIVALENT: f64 = 1.0e-3;
+/// 99 % of a normal distribution.
+const INTERVAL: f64 = 2.576;
+
+/// What a comparison says.
+#[derive(Clone, Copy, Debug)]
+struct Verdict {
+    /// Pooled paired z.
+    z: f64,
+    /// Farthest end of the 99 % interval of the relative bias.
+    bias: f64,
+    /// Share of the values that agree to 1e-4: all their paths are the same.
+    near: f64,
+}
+
+impl Verdict {
+    fn of(film: &Film, reference: &Film) -> Self {
+        let (a, b) = (means(film), means(reference));
+        let differences: Vec<f64> = a.iter().zip(&b).map(|(x, y)| x - y).collect();
+        let near = a
+            .iter()
+            .zip(&b)
+            .filter(|(x, y)| (*x - *y).abs() <= 1.0e-4 * y.abs());
+        let near = near.count() as f64 / a.len() as f64;
+        let (mean, error) = mean_and_error(&differences);
+        let size = b.iter().sum::<f64>() / b.len() as f64;
+        Self {
+            // Rounding has a mean of its own, which is no bias to speak of: 16 roundings of f32.
+            z: (mean.abs() - 16.0 * common::U * size).max(0.0) / error.max(f64::MIN_POSITIVE),
+            bias: (mean.abs() + INTERVAL * error) / size,
+            near,
+        }
+    }
+
+    fn passes(&self) -> bool {
+        // The share says how far the two go the same ways; far below one, the tests above would
+        // compare independent images, with little power at this size.
+        self.z < 3.9 && self.bias < EQUIVALENT && self.near > 0.98
+    }
+}
+
+/// Width, height and samples: what a few seconds of one core allow.
+fn size(path: &Path) -> (u32, u32, u64) {
+    if path.ends_with("field.toml") {
+        (32, 18, 8)
+    } else {
+        (48, 48, 64)
+    }
+}
+
+fn settings_of(path: &Path, scene: &Scene) -> Settings {
+    let (width, height, spp) = size(path);
+    settings(scene, width, height, spp)
+}
+
+/// Compares all jobs, and says what each of them found.
+fn check(jobs: impl Iterator<Item = (String, Scene, Settings)>) {
+    let mut failed = Vec::new();
+    for (name, scene, settings) in jobs {
+        let film = render_gpu(&scene, &settings);
+        let verdict = Verdict::of(&film, &render_cpu(&scene, &settings));
+        eprintln!("{name}: {verdict:?}");
+        if !verdict.passes() || film.tally().non_finite > 0 {
+            failed.push(format!("{name}: {verdict:?}, {:?}", film.tally()));
+        }
+    }
+    assert!(failed.is_empty(), "{}", failed.join("\n"));
+}
+
+#[test]
+fn every_scene_agrees_with_the_reference() {
+    check(scene_files().into_iter().map(|path| {
+        let scene = scene_file(&path);
+        let settings = settings_of(&path, &scene);
+        (path.display().to_string(), scene, settings)
+    }));
+}
+
+#[test]
+fn other_kernels_agree_with_the_reference() {
+    let names = [
+        "lecture",
+        "glass",
+        "lecture-reflective",
+        "tests/glass-ball",
+        "tests/nested",
+    ];
+    check(names.into_iter().flat_map(|name| {
+        let scene = scene_file(format!("scenes/{name}.toml"));
+        let base = settings(&scene, 40, 40, 32);
+        let lecture = Settings {
+            integrator: Integrator::Lecture { termination: 0.2 },
+            ..base.clone()
+        };
+        let list = Settings {
+            geometry: GeometryChoice::List,
+            roulette: false,
+            max_bounces: 12,
+            ..base
+        };
+        [
+            (format!("{name}, lecture"), scene.clone(), lecture),
+            (format!("{name}, list, without roulette"), scene, list),
+        ]
+    }));
+}
+
+/// The scene with all albedos and reflectances times `factor`, and glass of another index.
+fn perturbed(scene: &Scene, factor: f64) -> Scene {
+    let mut scene = scene.clone();
+    for material in &mut scene.materials {
+        match &mut material.kind {
+            MaterialKind::Diffuse { albedo } => *albedo *= factor,
+            MaterialKind::Mirror { reflectance } => *reflectance *= factor,
+            MaterialKind::Dielectric { ior } => *ior = 1.0 + factor * (*ior - 1.0),
+            MaterialKind::Reflective { albedo, .. } => *albedo *= factor,
+        }
+    }
+    scene
+}
+
+#[test]
+fn companion_one_percent_is_found() {
+    for name in [
+        "lecture",
+        "glass",
+        "tests/two-spheres",
+        "tests/furnace",
+        "tests/reflective",
+    ] {
+        let scene = scene_file(format!("scenes/{name}.toml"));
+        let settings = settings(&scene, 48, 48, 64);
+        let film = render_gpu(&perturbed(&scene, 0.99), &settings);
+        let verdict = Verdict::of(&film, &render_cpu(&scene, &settings));
+        assert!(!verdict.passes(), "{name}: {verdict:?}");
+    }
+}
+
+#[test]
+fn companion_a_moved_sphere_is_found() {
+    let mut scene = scene_file("scenes/tests/two-spheres.toml");
+    let settings = settings(&scene, 48, 48, 64);
+    let reference = render_cpu(&scene, &settings);
+    scene.spheres[1].radius *= 1.01;
+    let verdict = Verdict::of(&render_gpu(&scene, &settings), &reference);
+    assert!(!verdict.passes(), "{verdict:?}");
+}
+
+#[test]
+fn of_coincident_spheres_the_first_wins() {
+    // numerics.md, case 12; about a centre, and (the floor) about a pole.
+    let alone = scene_file("scenes/tests/two-spheres.toml");
+    let mut floor = alone.spheres[0];
+    (floor.center.y, floor.radius) = (-1001.0, 1000.0);
+    let mut twice = alone.clone();
+    let mut alone = alone;
+    alone.spheres.push(floor);
+    for sphere in &alone.spheres[..2] {
+        twice.spheres.push(*sphere);
+    }
+    twice.spheres.insert(2, floor);
+    twice.spheres.push(floor);
+    // The copies are of another material: they would show.
+    for copy in &mut twice.spheres[3..] {
+        copy.material = 1 - copy.material;
+    }
+    for geometry in [GeometryChoice::Baked, GeometryChoice::List] {
+        let settings = Settings {
+            geometry,
+            ..settings(&alone, 48, 48, 16)
+        };
+        let image = image_bits(&render_gpu(&alone, &settings));
+        assert_eq!(
+            image,
+            image_bits(&render_gpu(&twice, &settings)),
+            "{geometry:?}"
+        );
+        twice.spheres.rotate_right(3);
+        assert_ne!(
+            image,
+            image_bits(&render_gpu(&twice, &settings)),
+            "companion: {geometry:?}"
+        );
+        twice.spheres.rotate_left(3);
+    }
+}
