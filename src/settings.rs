@@ -2,7 +2,6 @@
 
 use std::time::Duration;
 
-use crate::reference::core::random::mix_bits;
 use crate::scene::Scene;
 
 /// Samples a pixel where neither the command line nor the scene says.
@@ -138,9 +137,16 @@ pub enum GeometryChoice {
 /// stream (`shaders/core/random.wesl`).
 #[must_use]
 pub fn stream_words(seed: u64, sample_high: u32) -> [u32; 2] {
-    // A round for each of the three words, so that every bit of them reaches both results.
-    [0x5eed_0001, 0x5eed_0002].map(|word| {
-        let mixed = mix_bits(mix_bits(word, seed as u32), (seed >> 32) as u32);
-        mix_bits(mixed, sample_high)
-    })
+    let both = split_mix(split_mix(seed) ^ u64::from(sample_high));
+    [both as u32, (both >> 32) as u32]
+}
+
+/// A bijection in which every bit of `x` reaches every bit of the result: SplitMix64 of Steele, Lea
+/// and Flood, "Fast Splittable Pseudorandom Number Generators" (OOPSLA 2014), with the constants of
+/// Stafford's variant 13.
+fn split_mix(x: u64) -> u64 {
+    let mut z = x.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^ (z >> 31)
 }

@@ -31,7 +31,7 @@ fn the_kernel_holds_what_the_scene_asks_for() {
         let text = folder.ok(&format!("effects {scene}"));
         let (inside, outside) = text.split_once("Left out").expect("two parts");
         folder.ok(&format!(
-            "{scene} --spp 1 --dump-wgsl k.wgsl -o r.npy --stats r.json"
+            "{scene} --spp 64 --dump-wgsl k.wgsl -o r.npy --stats r.json"
         ));
         let wgsl = String::from_utf8(folder.read("k.wgsl")).expect("text");
         let module = naga::front::wgsl::parse_str(&wgsl).unwrap_or_else(|e| panic!("{scene}: {e}"));

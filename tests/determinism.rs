@@ -23,9 +23,20 @@ fn bits(scene: &Scene, settings: &Settings) -> Vec<u32> {
 #[test]
 fn the_same_seed_gives_the_same_bits_and_another_gives_others() {
     let scene = glass_ball();
-    let one = settings(&scene, 48, 40, 20);
-    let first = bits(&scene, &one);
-    assert_eq!(first, bits(&scene, &one));
+    let one = settings(&scene, 48, 40, 64);
+    let first = render_gpu(&scene, &one);
+    assert_eq!(image_bits(&first), bits(&scene, &one));
+    // The background is the same for all seeds: what has a variance counts.
+    let noisy: Vec<usize> = (0..one.crop.pixels())
+        .flat_map(|i| {
+            let variance = first.variance_of_mean(i).expect("16 blocks");
+            (0..3)
+                .filter(move |c| variance[*c] > 0.0)
+                .map(move |c| 3 * i + c)
+        })
+        .collect();
+    assert!(noisy.len() > 1000, "only {} values are noisy", noisy.len());
+    let first = image_bits(&first);
     for seed in [1, 1 << 32, u64::MAX] {
         let other = bits(
             &scene,
@@ -34,12 +45,13 @@ fn the_same_seed_gives_the_same_bits_and_another_gives_others() {
                 ..one.clone()
             },
         );
-        let same = first.iter().zip(&other).filter(|(a, b)| a == b).count();
-        // The background is the same for all seeds.
+        let same = noisy.iter().filter(|i| first[**i] == other[**i]).count();
+        eprintln!("seed {seed}: {same} of {} values agree", noisy.len());
+        // Sums of few distinct values may agree by chance.
         assert!(
-            2 * same < first.len(),
+            5 * same < noisy.len(),
             "seed {seed}: {same} of {} values agree",
-            first.len()
+            noisy.len()
         );
     }
 }

@@ -94,6 +94,22 @@ fn a_lossless_closed_furnace_stops_at_the_limit() {
 }
 
 #[test]
+fn paths_of_any_length_are_whole() {
+    // 16 samples of 10001 rays are beyond what some drivers let a loop do: dispatches are resumed.
+    let scene = closed(1.0, 1.0);
+    for geometry in [GeometryChoice::Baked, GeometryChoice::List] {
+        let settings = Settings {
+            geometry,
+            max_bounces: 10_000,
+            ..settings(&scene, 8, 8, 16)
+        };
+        let film = render_gpu(&scene, &settings);
+        assert_eq!(deviation(&film, 10_001.0), 0.0, "{geometry:?}");
+        assert_eq!(film.tally().rays, 64 * 16 * 10_001, "{geometry:?}");
+    }
+}
+
+#[test]
 fn roulette_does_not_change_the_mean() {
     // Per pixel the estimate has a variance now: a z-test over all of them.
     let scene = closed(0.5, 1.0);

@@ -220,6 +220,36 @@ fn neighbours_are_uncorrelated() {
     assert!(largest < 4.0, "{largest} deviations: {place}");
 }
 
+/// Largest correlation, in standard deviations, between the numbers of a seed and of the seeds that
+/// differ from it in one bit or in all.
+fn largest_seed_correlation(words: impl Fn(u64) -> [u32; 2]) -> f64 {
+    let numbers = |seed: u64| -> Vec<f64> {
+        let stream = words(seed);
+        (0..65_536)
+            .map(|i| random4(stream, [i % 256, i / 256], 3, 1)[0])
+            .collect()
+    };
+    let base = numbers(0);
+    (0..64)
+        .map(|bit| 1 << bit)
+        .chain([u64::MAX])
+        .map(|seed| correlation(&base, &numbers(seed)).abs() * 256.0)
+        .fold(0.0, f64::max)
+}
+
+#[test]
+fn neighbouring_seeds_are_uncorrelated() {
+    // The largest of 65 independent deviates is below 4 with probability 0.996.
+    let largest = largest_seed_correlation(|seed| stream_words(seed, 0));
+    assert!(largest < 4.0, "{largest} deviations");
+}
+
+#[test]
+fn companion_seeds_that_are_not_mixed_are_correlated() {
+    let largest = largest_seed_correlation(|seed| [(seed >> 60) as u32, 0]);
+    assert!(largest > 100.0, "only {largest} deviations");
+}
+
 #[test]
 fn companion_a_weak_hash_is_correlated() {
     // One multiplication instead of two, and shifts.
