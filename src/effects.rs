@@ -12,6 +12,9 @@ use crate::settings::{GeometryChoice, Integrator, Settings};
 /// `benches/RESULTS.md`.
 pub const BAKED_LIMIT: usize = 24;
 
+/// Most spheres that can be baked at all: beyond, compiling takes minutes.
+pub const BAKED_MOST: usize = 256;
+
 /// One effect and what asked for it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Effect {
@@ -55,7 +58,7 @@ impl Effects {
             reasons(placement.spheres.iter().filter_map(|sphere| {
                 let material = &scene.materials[sphere.material];
                 wanted(sphere)
-                    .map(|why| format!("sphere {} ({}): {why}", sphere.source + 1, material.name))
+                    .map(|why| format!("sphere {} ({}){why}", sphere.source + 1, material.name))
             }))
         };
         let when = |condition: bool, reason: String| if condition { vec![reason] } else { vec![] };
@@ -85,15 +88,15 @@ impl Effects {
             Effect {
                 name: "pole",
                 what: "frames at the poles of spheres much larger than what is near them",
-                reasons: placed(&|s| s.pole.map(|_| "much larger than what is near it")),
+                reasons: placed(&|s| s.pole.map(|_| "")),
             },
             Effect {
                 name: "interior",
                 what: "paths inside spheres",
                 reasons: placed(&|s| match s.side {
                     Side::Outside => None,
-                    Side::Inside => Some("the camera is inside"),
-                    Side::Either => Some("has two sides"),
+                    Side::Inside => Some(", which the camera is in"),
+                    Side::Either => Some(", which has two sides"),
                 }),
             },
             Effect {

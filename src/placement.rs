@@ -163,17 +163,16 @@ fn approach(scene: &Scene, forward: DVec3) -> f64 {
 fn pole_normal(scene: &Scene, centers: &[DVec3], i: usize) -> Option<DVec3> {
     let (center, radius) = (centers[i], scene.spheres[i].radius);
     let small = |j: &usize| *j != i && scene.spheres[*j].radius < POLE_NEAR * radius;
-    if !(0..centers.len()).any(|j| small(&j)) && alone(scene, centers[i], i) {
+    if !(0..centers.len()).any(|j| small(&j)) && alone(scene, i) {
         return None;
     }
-    // The camera's view starts at the origin.
     let eye = scene.camera.position;
     let eye = eye - (scene.spheres[i].center - center);
     let points = || {
         (0..centers.len())
             .filter(small)
             .map(|j| (centers[j], scene.spheres[j].radius))
-            .chain([(eye, 0.0), (DVec3::ZERO, 0.0)])
+            .chain([(eye, 0.0)])
     };
     let gap = |point: DVec3| (point.distance(center) - radius).abs();
     if points().any(|(point, _)| gap(point) > POLE_FAR * radius) {
@@ -191,12 +190,11 @@ fn pole_normal(scene: &Scene, centers: &[DVec3], i: usize) -> Option<DVec3> {
     middle.try_normalize()
 }
 
-/// Whether neither the camera nor the start of its view is near the surface of sphere `i`.
-fn alone(scene: &Scene, center: DVec3, i: usize) -> bool {
+/// Whether the camera is not near the surface of sphere `i`.
+fn alone(scene: &Scene, i: usize) -> bool {
     let sphere = &scene.spheres[i];
-    let near = POLE_NEAR * sphere.radius;
-    let gap = |offset: DVec3| (offset.length() - sphere.radius).abs();
-    gap(scene.camera.position - sphere.center) >= near && gap(center) >= near
+    let distance = scene.camera.position.distance(sphere.center);
+    (distance - sphere.radius).abs() >= POLE_NEAR * sphere.radius
 }
 
 /// The pole: the centre is the large number here, and what is left of it the small one.

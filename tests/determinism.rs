@@ -197,6 +197,20 @@ fn parts_average_to_the_whole() {
     }
 }
 
+#[test]
+fn sums_lose_nothing_of_their_samples() {
+    // A single sample is not rounded, and high and low part of a sum are exact together, but for
+    // roundings of the low part: 8 of at most 8 u each, and as many again.
+    let scene = glass_ball();
+    let whole = settings(&scene, 24, 20, 8);
+    let film = means(&render_gpu(&scene, &whole));
+    let singles = of_parts(&scene, &whole, &[1, 2, 3, 4, 5, 6, 7, 8]);
+    for (mean, single) in film.iter().zip(singles) {
+        let off = (mean - single).abs();
+        assert!(off <= 128.0 * U * U * single, "{mean} and {single}");
+    }
+}
+
 /// Share of the values that differ by more than `tolerance`, relative; and z of the mean.
 fn compare(a: &Film, b: &Film, tolerance: f64) -> (f64, f64) {
     let (a, b) = (means(a), means(b));

@@ -7,6 +7,7 @@ use std::time::Duration;
 use clap::{Args, ValueEnum};
 
 use super::values;
+use crate::effects::BAKED_MOST;
 use crate::error::{Error, Result};
 use crate::output::ProgressMode;
 use crate::scene::{MAX_BOUNCES, Scene};
@@ -301,6 +302,13 @@ impl RenderArgs {
             GeometryArg::Baked => GeometryChoice::Baked,
             GeometryArg::List => GeometryChoice::List,
         };
+        if settings.geometry == GeometryChoice::Baked && scene.spheres.len() > BAKED_MOST {
+            return Err(Error::Usage(format!(
+                "--geometry baked takes up to {BAKED_MOST} spheres, the scene has {}: leave it to \
+                 auto, or use list",
+                scene.spheres.len()
+            )));
+        }
         settings.error = self.error;
         settings.time = self.time;
         if self.backend == BackendArg::Cpu && self.device.is_some() {

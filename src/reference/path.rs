@@ -225,7 +225,10 @@ impl Renderer for ReferenceRenderer {
     fn device(&self) -> (String, String, String) {
         let threads = self.threads.current_num_threads();
         (
-            format!("CPU reference, f64, {threads} threads"),
+            format!(
+                "CPU reference, f64, {threads} thread{}",
+                if threads == 1 { "" } else { "s" }
+            ),
             "cpu".into(),
             "none".into(),
         )
