@@ -27,7 +27,7 @@ const REGION: u32 = 1024;
 /// What a dispatch should take: short enough for every watchdog and for a smooth progress bar.
 const DISPATCH: Duration = Duration::from_millis(75);
 /// What all dispatches between two looks at the stop rules should take.
-const SLAB: Duration = Duration::from_millis(2000);
+const SLAB: Duration = Duration::from_millis(3000);
 /// Tiles that keep a GPU busy: below that a dispatch takes fewer samples instead.
 const BUSY_TILES: u32 = 64;
 
