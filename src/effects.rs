@@ -10,7 +10,7 @@ use crate::settings::{GeometryChoice, Integrator, Settings};
 
 /// Spheres up to which they are baked into the kernel as constants: measured, see
 /// `benches/RESULTS.md`.
-pub const BAKED_LIMIT: usize = 24;
+pub const BAKED_LIMIT: usize = 64;
 
 /// Most spheres that can be baked at all: beyond, compiling takes minutes.
 pub const BAKED_MOST: usize = 256;

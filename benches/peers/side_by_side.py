@@ -72,7 +72,7 @@ def main():
     parser.add_argument("binary")
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--spp", type=int, default=16, help="Mitsuba's samples a render")
-    parser.add_argument("--own-spp", type=int, default=64, help="gpu-trace's samples a render")
+    parser.add_argument("--own-spp", type=int, default=256, help="gpu-trace's samples a render")
     options = parser.parse_args()
     rows, version, device = {}, "", ""
     for turn in range(options.rounds):
