@@ -830,7 +830,7 @@ fn progress_lines(mode: ProgressMode, quiet: bool) -> Vec<String> {
     let snapshot = Snapshot {
         samples: 1_000_000,
         spp: 64,
-        spp_total: 256,
+        spp_total: Some(256),
         fraction: 0.25,
         elapsed: Duration::from_millis(12_000),
         remaining: Some(Duration::from_secs(3661)),
@@ -903,7 +903,7 @@ fn json_progress_is_an_object_a_line() {
 fn a_snapshot_reads_well() {
     let snapshot = Snapshot {
         spp: 4096,
-        spp_total: 65536,
+        spp_total: Some(65536),
         elapsed: Duration::from_millis(59_600),
         remaining: Some(Duration::from_secs(3661)),
         paths_per_second: 1_234_567_890.0,
@@ -915,9 +915,14 @@ fn a_snapshot_reads_well() {
         "4096/65536 spp  1:00, 1:01:01 left  1235 Mpaths/s  error 0.012 %"
     );
     let start = Snapshot {
-        spp_total: 64,
+        spp_total: Some(64),
         error: Some(f64::INFINITY),
         ..Snapshot::default()
     };
     assert_eq!(start.to_string(), "0/64 spp  0:00  0 Mpaths/s  error inf %");
+    let without_end = Snapshot {
+        spp: 7,
+        ..Snapshot::default()
+    };
+    assert_eq!(without_end.to_string(), "7 spp  0:00  0 Mpaths/s");
 }

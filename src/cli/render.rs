@@ -424,7 +424,7 @@ struct Display<'a> {
     progress: &'a Progress,
     signals: &'a Signals,
     pixels: u64,
-    spp: u64,
+    spp: Option<u64>,
     time: Option<Duration>,
     error: Option<f64>,
     /// Where the current stretch of speed measurement began.
@@ -438,7 +438,8 @@ impl<'a> Display<'a> {
             progress,
             signals,
             pixels: settings.crop.pixels() as u64,
-            spp: settings.samples.end - settings.samples.start,
+            // A cap that nobody asked for says nothing about how far the render is.
+            spp: Some(settings.samples.end - settings.samples.start).filter(|n| *n != MAXIMUM_SPP),
             time: settings.time,
             error: settings.error,
             mark: (Duration::ZERO, 0),

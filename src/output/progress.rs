@@ -28,8 +28,8 @@ pub struct Snapshot {
     pub samples: u64,
     /// Samples per pixel taken so far.
     pub spp: u64,
-    /// Samples per pixel to be taken at most.
-    pub spp_total: u64,
+    /// Samples per pixel to be taken, where a number was asked for.
+    pub spp_total: Option<u64>,
     /// The share of the work that is done, 0 to 1, by whichever stop rule is nearest.
     pub fraction: f64,
     /// Since the start.
@@ -229,7 +229,7 @@ enum JsonLine<'a> {
         kind: &'static str,
         samples: u64,
         spp: u64,
-        spp_total: u64,
+        spp_total: Option<u64>,
         fraction: f64,
         elapsed: f64,
         remaining: Option<f64>,
@@ -262,13 +262,11 @@ impl JsonLine<'_> {
 /// As in `64/256 spp  0:12, 0:36 left  14.2 Mpaths/s  error 1.3 %`.
 impl std::fmt::Display for Snapshot {
     fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(
-            formatter,
-            "{}/{} spp  {}",
-            self.spp,
-            self.spp_total,
-            clock(self.elapsed)
-        )?;
+        write!(formatter, "{}", self.spp)?;
+        if let Some(total) = self.spp_total {
+            write!(formatter, "/{total}")?;
+        }
+        write!(formatter, " spp  {}", clock(self.elapsed))?;
         if let Some(remaining) = self.remaining {
             write!(formatter, ", {} left", clock(remaining))?;
         }

@@ -12,7 +12,8 @@ Usage: cargo xtask bench [TABLE...]
   unused     effects that a scene does not use
   geometry   spheres as constants or in a buffer
   resources  time to the first window, peak memory
-  peers      Mitsuba 3 on the same scene (installs it into target/peers with pip)
+  peers      Mitsuba 3 on the same scene (installs it into target/peers with pip;
+             needs LLVM 19, as of Debian's libllvm19, for its compiled variant)
 
 Without a name: all but peers. Run it on an idle machine.
 ";
