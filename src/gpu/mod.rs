@@ -4,3 +4,4 @@ pub mod device;
 pub mod layout;
 pub mod probe;
 pub mod renderer;
+mod upload;
