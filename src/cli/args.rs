@@ -1,7 +1,7 @@
 //! The options of `render` as they are typed.
 
 use std::ops::Range;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use clap::{Args, ValueEnum};
@@ -236,6 +236,14 @@ choices! {
 }
 
 impl RenderArgs {
+    /// The scene file, if the scene is one: no output may replace it.
+    pub(super) fn scene_file(&self) -> Option<&Path> {
+        self.scene
+            .as_deref()
+            .map(Path::new)
+            .filter(|path| path.is_file())
+    }
+
     /// How progress is shown.
     #[must_use]
     pub fn progress_mode(&self) -> ProgressMode {

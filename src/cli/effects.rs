@@ -3,11 +3,10 @@
 use std::fmt::Write as _;
 
 use super::args::RenderArgs;
-use super::print;
+use super::{derive, print};
 use crate::effects::Effects;
 use crate::error::{Error, Result};
 use crate::output::{atomic, check_all};
-use crate::placement::Placement;
 use crate::scene::builtin;
 use crate::shader::{Stage, link};
 
@@ -15,11 +14,10 @@ use crate::shader::{Stage, link};
 pub(super) fn run(args: &RenderArgs, json: bool) -> Result<()> {
     let loaded = builtin::resolve(args.scene.as_deref())?;
     let settings = args.settings(&loaded.scene)?;
-    let placement = Placement::new(&loaded.scene, settings.width, settings.height);
-    let effects = Effects::derive(&loaded.scene, &placement, &settings);
+    let (placement, effects) = derive(&loaded.scene, &settings)?;
     let kernel = link(Stage::Path, &loaded.scene, &placement, &effects)?;
     if let Some(path) = &args.dump_wgsl {
-        check_all(&[path], &[])?;
+        check_all(&[path], args.scene_file().as_slice())?;
         atomic::write(path, kernel.wgsl.as_bytes())?;
     }
     let lines = kernel.wgsl.lines().count();

@@ -14,7 +14,12 @@ use std::path::{Path, PathBuf};
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{CommandFactory as _, Parser, Subcommand};
 
+use crate::effects::Effects;
 use crate::error::{Error, Result};
+use crate::media::MAX_LEVELS;
+use crate::placement::Placement;
+use crate::scene::Scene;
+use crate::settings::Settings;
 
 pub use args::RenderArgs;
 
@@ -167,6 +172,20 @@ fn misplaced_word(error: &clap::Error) -> Option<String> {
             format!("unexpected argument '{word}': one scene is rendered at a time")
         }
     })
+}
+
+/// Placement and effects of `scene`: what every command that needs a kernel starts from.
+fn derive(scene: &Scene, settings: &Settings) -> Result<(Placement, Effects)> {
+    let placement = Placement::new(scene, settings.width, settings.height);
+    if placement.media.levels > MAX_LEVELS {
+        return Err(Error::Scene(format!(
+            "more than {MAX_LEVELS} dielectrics lie in or across each other: the scene needs {} \
+             levels of priority",
+            placement.media.levels
+        )));
+    }
+    let effects = Effects::derive(scene, &placement, settings);
+    Ok((placement, effects))
 }
 
 /// Prints a result. A reader that has seen enough (`| head`) is no error.

@@ -6,13 +6,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use super::args::{BackendArg, RenderArgs};
-use super::print;
+use super::{derive, print};
 use crate::effects::Effects;
 use crate::error::{Error, Result};
 use crate::estimate::energy_cut_at_most;
 use crate::gpu::device::{self, DRIVER_ADVICE, DeviceChoice, Gpu};
 use crate::gpu::renderer::GpuRenderer;
-use crate::media::MAX_LEVELS;
 use crate::output::stats::{BounceLimit, Device, Seconds};
 use crate::output::{
     Contents, Picture, Progress, Snapshot, Stats, Target, atomic, check_all, write_all,
@@ -135,21 +134,9 @@ fn prepare(args: &RenderArgs) -> Result<Job> {
     let mut outputs: Vec<&Path> = targets.iter().map(|t| t.path.as_path()).collect();
     outputs.extend(args.stats.as_deref());
     outputs.extend(args.dump_wgsl.as_deref());
-    let scene_file = args
-        .scene
-        .as_deref()
-        .map(Path::new)
-        .filter(|path| path.is_file());
-    check_all(&outputs, scene_file.as_slice())?;
+    check_all(&outputs, args.scene_file().as_slice())?;
     check_memory(&settings.crop)?;
-    let placement = Placement::new(&loaded.scene, settings.width, settings.height);
-    if placement.media.levels > MAX_LEVELS {
-        return Err(Error::Scene(format!(
-            "more than {MAX_LEVELS} dielectrics lie in or across each other: the scene needs {} levels of priority",
-            placement.media.levels
-        )));
-    }
-    let effects = Effects::derive(&loaded.scene, &placement, &settings);
+    let (placement, effects) = derive(&loaded.scene, &settings)?;
     Ok(Job {
         loaded,
         settings,
