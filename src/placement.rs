@@ -18,6 +18,9 @@ use crate::settings::Offset;
 pub struct Placement {
     /// Kernel units per scene unit, a power of two.
     pub scale: f64,
+    /// Kernel radiance per radiance, a power of two that brings the brightest light to 2^32: sums of
+    /// squares in f32 then hold light of 1e20, and beside it light a 1e-29 of that.
+    pub light: f64,
     /// The spheres that paths can reach, those with a pole frame first, else in scene order.
     pub spheres: Vec<PlacedSphere>,
     /// How many of `spheres` have a pole frame.
@@ -187,6 +190,7 @@ impl Placement {
         let camera = place_camera(scene, forward, approach, scale, width, height);
         Self {
             scale,
+            light: light(scene, &order),
             spheres,
             poles,
             media,
@@ -194,6 +198,21 @@ impl Placement {
             camera,
             offset: offset.scaled(scale),
         }
+    }
+}
+
+/// The unit of radiance for the reachable spheres `all`.
+fn light(scene: &Scene, all: &[usize]) -> f64 {
+    let emission = |i: &usize| scene.materials[scene.spheres[*i].material].emission;
+    let brightest = all
+        .iter()
+        .map(emission)
+        .chain(scene.environment)
+        .fold(0.0, |most: f64, radiance| most.max(radiance.max_element()));
+    if brightest > 0.0 {
+        (32.0 - brightest.log2().floor()).exp2()
+    } else {
+        1.0
     }
 }
 

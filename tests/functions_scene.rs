@@ -3,8 +3,9 @@
 
 mod common;
 
-use common::{Agreement, EMPTY, Random, Row, ULP, probe, probe_of, scene, to_row, vector};
+use common::{Agreement, EMPTY, Row, ULP, probe, probe_of, scene, to_row, vector};
 use glam::DVec3;
+use gpu_trace::check::Random;
 use gpu_trace::media::Medium;
 use gpu_trace::placement::{PlacedSphere, Placement, Side};
 use gpu_trace::reference::scene::camera::camera_ray;

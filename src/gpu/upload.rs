@@ -50,7 +50,8 @@ impl Uploads {
         all.push((2, "attributes", bytemuck::cast_slice(&attributes).to_vec()));
         if let Some((members, size)) = kernel.struct_members("Material") {
             let materials = scene.materials.iter();
-            let bytes = materials.flat_map(|m| MaterialRecord::new(m).bytes(&members, size));
+            let record = |m| MaterialRecord::new(m, placement.light);
+            let bytes = materials.flat_map(|m| record(m).bytes(&members, size));
             all.push((3, "materials", bytes.collect()));
         }
         // A binding of size zero is not allowed; what it holds is never read.

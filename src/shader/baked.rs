@@ -175,7 +175,7 @@ fn material_of(text: &mut String, scene: &Scene, placement: &Placement, effects:
     let records: Vec<MaterialRecord> = placement
         .spheres
         .iter()
-        .map(|s| MaterialRecord::new(&scene.materials[s.material]))
+        .map(|s| MaterialRecord::new(&scene.materials[s.material], placement.light))
         .collect();
     *text += "fn material_of(index: u32) -> Material {\nvar material: Material;\n";
     for name in MaterialRecord::members(effects) {

@@ -172,7 +172,7 @@ fn config(scene: &Scene, placement: &Placement, effects: &Effects) -> String {
         ray_steps(placement, effects)
     );
     if effects.has("environment") {
-        let radiance = scene.environment.unwrap_or_default();
+        let radiance = scene.environment.unwrap_or_default() * placement.light;
         text += &format!("const ENVIRONMENT: vec3f = {};\n", baked::vector(radiance));
     }
     if effects.has("nudge") {

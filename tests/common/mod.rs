@@ -4,7 +4,6 @@
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-pub(crate) use gpu_trace::check::Random;
 use gpu_trace::effects::Effects;
 use gpu_trace::film::Film;
 use gpu_trace::gpu::device::{DRIVER_ADVICE, DeviceChoice, Gpu, open};
@@ -16,7 +15,6 @@ use gpu_trace::render::render_quietly;
 use gpu_trace::scene::Scene;
 use gpu_trace::scene::load::{load_file, load_str};
 use gpu_trace::settings::{Rect, Settings};
-pub(crate) use gpu_trace::statistics;
 
 /// Unit roundoff of f32.
 pub(crate) const U: f64 = 1.0 / (1 << 24) as f64;
