@@ -139,7 +139,9 @@ impl Optional {
     pub(crate) fn install(self) -> Result<(), String> {
         eprintln!("{} is not installed; trying apt-get", self.name());
         match self {
-            Self::SwiftShader => unpack_swiftshader(),
+            Self::SwiftShader => unpack_swiftshader().map_err(|error| {
+                format!("{error} (it is taken from Debian's package {SWIFTSHADER_PACKAGE})")
+            }),
             Self::Gl => install(&["libegl1", "libgl1-mesa-dri"]),
         }
     }
@@ -152,7 +154,10 @@ fn folder() -> PathBuf {
 
 fn apt() -> Command {
     let mut command = Command::new("apt-get");
-    command.env("DEBIAN_FRONTEND", "noninteractive");
+    command
+        .env("DEBIAN_FRONTEND", "noninteractive")
+        // A download into a folder of ours is no fault to warn of.
+        .args(["-o", "APT::Sandbox::User=root"]);
     command
 }
 
