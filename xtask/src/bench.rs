@@ -1,9 +1,9 @@
 //! `cargo xtask bench`: the benchmarks, as ratios of things that run side by side.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 
-use crate::{cargo, run};
+use crate::{cargo, program, run};
 
 const USAGE: &str = "\
 Usage: cargo xtask bench [TABLE...]
@@ -50,20 +50,13 @@ pub(crate) fn all(tables: &[String]) -> Result<(), String> {
     Ok(())
 }
 
-/// The program, as cargo has built it.
-fn program() -> PathBuf {
-    let target =
-        std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| "target".into(), PathBuf::from);
-    target.join("release/gpu-trace")
-}
-
 /// Time from launch to an image of the first window (16 samples), and peak memory of a render.
 fn resources() -> Result<(), String> {
     let folder = std::env::temp_dir().join(format!("gpu-trace-bench-{}", std::process::id()));
     std::fs::create_dir_all(&folder).map_err(|e| e.to_string())?;
     let image = folder.join("image.exr");
     let render = |spp: &str| {
-        let mut command = Command::new(program());
+        let mut command = Command::new(program("release"));
         command
             .args(["lecture", "--quiet", "--spp", spp, "-o"])
             .arg(&image);
@@ -126,6 +119,6 @@ fn peers() -> Result<(), String> {
     ]))?;
     run(Command::new(&python)
         .arg("benches/peers/side_by_side.py")
-        .arg(program())
+        .arg(program("release"))
         .env("NODEVICE_SELECT", "1"))
 }
