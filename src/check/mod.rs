@@ -7,6 +7,7 @@
 
 mod context;
 mod driver;
+mod exits;
 mod inputs;
 mod integrator;
 mod intersection;
@@ -15,6 +16,7 @@ mod placing;
 
 pub use context::Context;
 pub use driver::{DriverReport, probe_driver};
+pub use exits::{Exits, exits};
 pub use inputs::Random;
 
 use crate::error::Result;

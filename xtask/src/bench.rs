@@ -10,6 +10,7 @@ Usage: cargo xtask bench [TABLE...]
 
   naive      the kernel against a plain one
   unused     effects that a scene does not use
+  offsets    ways to leave a surface: what each gets wrong, and costs
   geometry   spheres as constants or in a buffer
   resources  time to the first window, peak memory
   peers      Mitsuba 3 on the same scene (installs it into target/peers with pip;
@@ -20,7 +21,14 @@ Without a name: all but peers. Run it on an idle machine.
 
 /// Runs the benchmarks named in `tables`.
 pub(crate) fn all(tables: &[String]) -> Result<(), String> {
-    const KNOWN: [&str; 5] = ["naive", "unused", "geometry", "resources", "peers"];
+    const KNOWN: [&str; 6] = [
+        "naive",
+        "unused",
+        "geometry",
+        "offsets",
+        "resources",
+        "peers",
+    ];
     if tables.iter().any(|t| t == "--help" || t == "-h") {
         print!("{USAGE}");
         return Ok(());
@@ -30,7 +38,7 @@ pub(crate) fn all(tables: &[String]) -> Result<(), String> {
     }
     let chosen = |name: &str| tables.is_empty() || tables.iter().any(|t| t == name);
     run(cargo().args(["build", "--release"]))?;
-    let in_process: Vec<&str> = KNOWN[..3]
+    let in_process: Vec<&str> = KNOWN[..4]
         .iter()
         .copied()
         .filter(|name| chosen(name))
