@@ -308,7 +308,8 @@ def main():
         device = scene["device"]
     if not data:
         sys.exit(f"{options.folder}: no scene; run `cargo bench --bench hazards -- FOLDER` first")
-    print(f"{title}; gpu-trace and naive on {device}; Mitsuba {mi.__version__} {mi.variant()}; {cpu_name()}\n")
+    peer = f"Mitsuba {mi.__version__} {mi.variant()}"
+    print(f"{title}; gpu-trace and naive on {device}; {peer}; {cpu_name()}\n")
     print("| scene | renderer | mean, % | worst block, % | bad blocks, % | |")
     print("|---|---|---|---|---|---|")
     print("\n".join(lines))
@@ -318,7 +319,7 @@ def main():
     print("\n".join(opinions))
     if "balls" in data and "balls-moved" in data:
         moved = data["balls-moved"]["truth"].mean(axis=0) / data["balls"]["truth"].mean(axis=0) - 1.0
-        print(f"\nMoved and unmoved truth differ by {abs(moved).max():.1e} at most, relative, by pixel.")
+        print(f"\nMoved and unmoved truth differ in no pixel by more than {100.0 * abs(moved).max():.1g} %.")
     if options.panel:
         panel(data, options.panel)
 

@@ -15,7 +15,7 @@ Usage: cargo xtask bench [TABLE...]
   peers      Mitsuba 3 on the same scene (installs it into target/peers with pip;
              needs LLVM 19, as of Debian's libllvm19, for its compiled variant)
   hazards    how exact the kernel, a plain one and Mitsuba 3 are on scenes that are hard in f32
-             (installs as peers does; writes docs/images/hazards.png; takes half an hour)
+             (installs as peers does; writes docs/images/hazards.png; takes ten minutes)
 
 Without a name: all but peers and hazards. Run it on an idle machine.
 ";
