@@ -60,7 +60,7 @@ fn ours(
     let mut settings = Settings::for_scene(scene);
     settings.samples = 0..SPP;
     change(&mut settings);
-    let placement = Placement::new(scene, settings.width, settings.height);
+    let placement = Placement::with_offset(scene, settings.width, settings.height, settings.offset);
     let mut effects = Effects::derive(scene, &placement, &settings);
     if !with.is_empty() {
         let names: Vec<&'static str> = effects.names().chain(with.iter().copied()).collect();

@@ -39,6 +39,11 @@ impl Uploads {
             if effects.has("priority") {
                 attributes.push(sphere.level);
             }
+            if effects.has("nested") {
+                for other in [sphere.container, sphere.core] {
+                    attributes.push(other.map_or(u32::MAX, |i| i as u32));
+                }
+            }
         }
         all.push((0, "spheres", bytemuck::cast_slice(&spheres).to_vec()));
         all.push((1, "poles", bytemuck::cast_slice(&poles).to_vec()));
