@@ -1,7 +1,8 @@
-//! Tasks of the project: `cargo xtask test`, `cargo xtask bench`.
+//! Tasks of the project: `cargo xtask test`, `cargo xtask bench` and others.
 
 mod bench;
 mod drivers;
+mod numerics;
 mod test;
 
 use std::path::{Path, PathBuf};
@@ -13,6 +14,7 @@ Usage: cargo xtask TASK
   test     install what the tests need (Mesa lavapipe), check format and lints, run every test on
            every driver that is there (--help for its options)
   bench    run the benchmarks side by side and print their table (--help for its options)
+  numerics run `gpu-trace check` on every driver that is there, into the table of docs/numerics.md
 ";
 
 fn main() -> ExitCode {
@@ -21,6 +23,7 @@ fn main() -> ExitCode {
     let rest: Vec<String> = arguments.collect();
     let done = match task.as_deref() {
         Some("test") => test::all(&rest),
+        Some("numerics") => numerics::all(),
         Some("bench") => bench::all(&rest),
         Some("help" | "--help" | "-h") => {
             print!("{USAGE}");
