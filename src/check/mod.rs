@@ -10,8 +10,10 @@ mod driver;
 mod inputs;
 mod integrator;
 mod intersection;
+mod lights;
 mod materials;
 mod placing;
+mod sampling;
 
 pub use context::Context;
 pub use driver::{DriverReport, probe_driver};
@@ -56,10 +58,12 @@ pub enum Run {
 /// All cases, by number.
 #[must_use]
 pub fn cases() -> Vec<Case> {
-    let groups: [&[Case]; 4] = [
+    let groups: [&[Case]; 6] = [
         intersection::CASES,
         placing::CASES,
+        lights::CASES,
         materials::CASES,
+        sampling::CASES,
         integrator::CASES,
     ];
     let mut all = groups.concat();
