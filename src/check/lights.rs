@@ -61,6 +61,9 @@ pub(super) const CASES: &[Case] = &[
 /// Half the height of the image plane at distance 1, for the field of view of [`SceneText`].
 const HALF_HEIGHT: f64 = 0.324_919_696_232_906_3;
 
+/// What a scene's lengths are multiplied by.
+const RADII: [f64; 5] = [1.0e-5, 1.0e-3, 1.0, 1.0e3, 1.0e6];
+
 /// Pixels along the sides of these images.
 const SIDE: u32 = 16;
 
@@ -84,8 +87,7 @@ fn sines(i: usize) -> [f64; 2] {
 
 fn inside(context: &Context) -> Result<Measure> {
     let mut measure = Measure::new(1.0, "of the bound");
-    let radii: &[f64] = context.size(&[1.0e-5, 1.0e6], &[1.0e-5, 1.0e-3, 1.0, 1.0e3, 1.0e6]);
-    for &radius in radii {
+    for &radius in context.size(&[1.0e-5, 1.0, 1.0e6][..], &RADII) {
         furnace(context, radius, &mut measure)?;
     }
     contrast(context, &mut measure)?;
@@ -184,8 +186,7 @@ fn emitter(text: SceneText, number: usize) -> SceneText {
 
 fn itself(context: &Context) -> Result<Measure> {
     let mut measure = Measure::new(0.0, "off the emission");
-    let radii: &[f64] = context.size(&[1.0e-5, 1.0, 1.0e6], &[1.0e-5, 1.0e-3, 1.0, 1.0e3, 1.0e6]);
-    for (i, &radius) in radii.iter().enumerate() {
+    for (i, radius) in RADII.into_iter().enumerate() {
         for number in 0..3 {
             if !context.options.quick || number == i % 3 {
                 alone(context, radius, number, &mut measure)?;
@@ -246,7 +247,7 @@ fn bright_and_dim(context: &Context) -> Result<Measure> {
     let mut measure = Measure::new(1.0, "of the bound");
     let (scene, settings) = two_sides(context, [1.0, 1.0])?;
     let plain = context.render(&scene, &settings)?;
-    for exponents in [[20, -20], [66, 66], [-66, -66]] {
+    for exponents in [[20, -20], [-66, -66], [66, 66]] {
         let (scene, settings) = two_sides(context, exponents.map(|k| 2f64.powi(k)))?;
         let film = context.render(&scene, &settings)?;
         scaled(context, &plain, &film, exponents, &mut measure);

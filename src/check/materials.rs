@@ -390,7 +390,7 @@ const SIDE: u32 = 16;
 fn furnaces(context: &Context) -> Result<Measure> {
     let mut measure = Measure::new(1.0, "of the bound");
     let radii: &[f64] = context.size(
-        &[1.0e-5, 1.0e6],
+        &[1.0e-5, 1.0, 1.0e6],
         &[1.0e-5, 1.0e-3, 0.1, 1.0, 50.0, 1.0e3, 1.0e6],
     );
     for &radius in radii {
