@@ -108,7 +108,7 @@ fn basis(context: &Context) -> Result<Measure> {
         .map(|i| normal(&mut random, i, 0.0))
         .collect();
     let outputs: Vec<[Row; 2]> = context.probe(&[])?.call("basis_around", &inputs)?;
-    let mut measure = Measure::new(BASIS, "of 1");
+    let mut measure = Measure::new(BASIS, "absolute");
     for (row, [t, b]) in inputs.iter().zip(&outputs) {
         let (n, t, b) = (vector(*row), vector(*t), vector(*b));
         let twin = basis_around(n + DVec3::splat(context.disturbed(1.0e-4) - 1.0));
@@ -212,9 +212,9 @@ fn fresnel(context: &Context) -> Result<Measure> {
 /// The same share from the other side, where the refraction is not total.
 ///
 /// The square of the cosine that comes back: 4 roundings of two terms of at most 1, times the larger
-/// index ratio's square, the same once more from the way there, and 1 of 1/eta, 17 together. The cosine
-/// is off by that over twice the cosine, the share by 4 over the other cosine times that; twice as much
-/// where the roundings are as large as the square. The terms themselves: 14 on each way.
+/// index ratio's square, the same once more from the way there, and 1 of 1/eta, 17 together. The
+/// cosine is off by that over twice the cosine, the share by 4 over the other cosine times that;
+/// twice as much where the roundings are as large as the square. The terms themselves: 14 each way.
 fn returned(
     context: &Context,
     probe: &Probe,
@@ -403,8 +403,8 @@ fn furnaces(context: &Context) -> Result<Measure> {
     Ok(measure)
 }
 
-/// Three lossless balls. A path that is lost or counted twice moves a pixel by 1/64, the roundings of
-/// a path by less than 6e-5 (64 events of 16 halves of an ulp): 1e-3 lies between.
+/// Three lossless balls. A path that is lost or counted twice moves a pixel by 1/64, the roundings
+/// of a path by less than 6e-5 (64 events of 16 halves of an ulp): 1e-3 lies between.
 fn white(context: &Context, radius: f64, measure: &mut Measure) -> Result<()> {
     // Disturbed, the mirror loses a little.
     let reflectance = 2.0 - context.disturbed(1.0e-2);
@@ -453,8 +453,9 @@ fn gray(context: &Context, radius: f64, measure: &mut Measure) -> Result<()> {
     Ok(())
 }
 
-/// The reflective material: albedo + mu pi (2 epsilon - epsilon^2) cos(theta), theta being the angle at
-/// the camera's side, where the lobe is above the horizon; a ball that fills the image up to 57 degrees.
+/// The reflective material: albedo + mu pi (2 epsilon - epsilon^2) cos(theta), theta being the angle
+/// at the camera's side, where the lobe is above the horizon; a ball that fills the image up to 57
+/// degrees.
 fn lossy(context: &Context, radius: f64, measure: &mut Measure) -> Result<()> {
     let members = "type = \"reflective\"\nalbedo = [0.37, 0.37, 0.37]\nspecular = [1, 1, 1]\n\
                    epsilon = 0.01\nmu = 10.0";
