@@ -1,7 +1,7 @@
 //! Cases 16 to 21: lights.
 //!
-//! Lights are spheres that paths happen to hit, so what is measured are whole images. Their truth is
-//! known exactly, or comes from the same paths in f64.
+//! Lights are spheres that paths happen to hit, so what is measured are whole images. Their truth
+//! is known exactly, or comes from the same paths in f64.
 
 use super::context::{Context, SceneText, means};
 use super::intersection::ULP;
@@ -139,8 +139,8 @@ fn furnace(context: &Context, radius: f64, measure: &mut Measure) -> Result<()> 
 }
 
 /// Diffuse balls that do not emit, in black emitting walls. A sample is 1, or a power of the albedo
-/// 0.5 by how often the path met a ball; at a silhouette, within some 1e-6 of it, f32 may say either,
-/// which moves a pixel by one sample.
+/// 0.5 by how often the path met a ball; at a silhouette, within some 1e-6 of it, f32 may say
+/// either, which moves a pixel by one sample.
 fn contrast(context: &Context, measure: &mut Measure) -> Result<()> {
     let spp = context.size(16, 64);
     for &radius in context.size(&[1.0][..], &[1.0e-3, 1.0, 1.0e3]) {
@@ -177,8 +177,8 @@ fn emitter(text: SceneText, number: usize) -> SceneText {
         _ => text.material(
             "lamp",
             &format!(
-                "type = \"reflective\"\nalbedo = [0.375, 0.375, 0.375]\nspecular = [0.5, 0.5, 0.5]\n\
-                 epsilon = 0.01\nmu = 10.0\n{emission}"
+                "type = \"reflective\"\nalbedo = [0.375, 0.375, 0.375]\n\
+                 specular = [0.5, 0.5, 0.5]\nepsilon = 0.01\nmu = 10.0\n{emission}"
             ),
         ),
     }

@@ -7,6 +7,7 @@
 
 mod context;
 mod driver;
+mod furnaces;
 mod inputs;
 mod integrator;
 mod intersection;
@@ -58,11 +59,12 @@ pub enum Run {
 /// All cases, by number.
 #[must_use]
 pub fn cases() -> Vec<Case> {
-    let groups: [&[Case]; 6] = [
+    let groups: [&[Case]; 7] = [
         intersection::CASES,
         placing::CASES,
         lights::CASES,
         materials::CASES,
+        furnaces::CASES,
         sampling::CASES,
         integrator::CASES,
     ];
