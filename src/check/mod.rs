@@ -8,11 +8,14 @@
 mod context;
 mod driver;
 mod exits;
+mod furnaces;
 mod inputs;
 mod integrator;
 mod intersection;
+mod lights;
 mod materials;
 mod placing;
+mod sampling;
 
 pub use context::Context;
 pub use driver::{DriverReport, probe_driver};
@@ -58,10 +61,13 @@ pub enum Run {
 /// All cases, by number.
 #[must_use]
 pub fn cases() -> Vec<Case> {
-    let groups: [&[Case]; 4] = [
+    let groups: [&[Case]; 7] = [
         intersection::CASES,
         placing::CASES,
+        lights::CASES,
         materials::CASES,
+        furnaces::CASES,
+        sampling::CASES,
         integrator::CASES,
     ];
     let mut all = groups.concat();
