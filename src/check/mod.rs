@@ -7,6 +7,7 @@
 
 mod context;
 mod driver;
+mod film;
 mod inputs;
 mod integrator;
 mod intersection;
@@ -56,11 +57,12 @@ pub enum Run {
 /// All cases, by number.
 #[must_use]
 pub fn cases() -> Vec<Case> {
-    let groups: [&[Case]; 4] = [
+    let groups: [&[Case]; 5] = [
         intersection::CASES,
         placing::CASES,
         materials::CASES,
         integrator::CASES,
+        film::CASES,
     ];
     let mut all = groups.concat();
     all.sort_by_key(|case| case.id);
