@@ -8,6 +8,7 @@
 mod context;
 mod driver;
 mod exits;
+mod film;
 mod furnaces;
 mod inputs;
 mod integrator;
@@ -61,7 +62,7 @@ pub enum Run {
 /// All cases, by number.
 #[must_use]
 pub fn cases() -> Vec<Case> {
-    let groups: [&[Case]; 7] = [
+    let groups: [&[Case]; 8] = [
         intersection::CASES,
         placing::CASES,
         lights::CASES,
@@ -69,6 +70,7 @@ pub fn cases() -> Vec<Case> {
         furnaces::CASES,
         sampling::CASES,
         integrator::CASES,
+        film::CASES,
     ];
     let mut all = groups.concat();
     all.sort_by_key(|case| case.id);

@@ -7,6 +7,7 @@ use serde::Serialize;
 
 use super::{Metadata, atomic};
 use crate::error::{Error, Result};
+pub use crate::estimate::VarianceClass;
 pub use crate::render::StoppedBy;
 
 /// All that is known of a finished render. The names are those of the JSON, which users' scripts
@@ -55,6 +56,9 @@ pub struct Stats {
     pub rays: u64,
     /// The relative error, a fraction; `null` where unknown.
     pub estimated_error: Option<f64>,
+    /// Whether the variance, and with it the error, is one that samples can show: `finite`,
+    /// `heavy-tailed`, or `infinite`, where the error is unknown.
+    pub variance: VarianceClass,
     /// Whether no light at all was found, which leaves the error without meaning.
     pub black: bool,
     /// Samples that were not finite.

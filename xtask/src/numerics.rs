@@ -24,7 +24,9 @@ pub(crate) fn all() -> Result<(), String> {
     let reports: Vec<Value> = drivers.iter().map(report).collect::<Result<_, _>>()?;
     let page = root().join(PAGE);
     let text = std::fs::read_to_string(&page).map_err(|e| format!("{PAGE}: {e}"))?;
-    let (head, rest) = text.split_once(BEGIN).ok_or("the page has no place for it")?;
+    let (head, rest) = text
+        .split_once(BEGIN)
+        .ok_or("the page has no place for it")?;
     let (_, tail) = rest.split_once(END).ok_or("the page has no end of it")?;
     let text = format!("{head}{BEGIN}{}{END}{tail}", table(&drivers, &reports));
     std::fs::write(&page, text).map_err(|e| format!("{PAGE}: {e}"))
@@ -59,15 +61,27 @@ fn table(drivers: &[Driver], reports: &[Value]) -> String {
         let name = format!("**{}**: {}", text(&case["name"]), text(&case["setup"]));
         if case["verdict"] == "not-applicable" {
             let why = text(&case["why"]);
-            lines.push(format!("| {} | {name} | not applicable: {why} |", case["id"]));
+            lines.push(format!(
+                "| {} | {name} | not applicable: {why} |",
+                case["id"]
+            ));
             continue;
         }
         let cells: Vec<String> = reports
             .iter()
             .map(|report| {
                 let case = &cases(report)[i];
-                let fails = if case["verdict"] == "fail" { "**FAILS** " } else { "" };
-                format!("{fails}{} of {}; {}", case["failures"], case["trials"], short(&case["worst"]))
+                let fails = if case["verdict"] == "fail" {
+                    "**FAILS** "
+                } else {
+                    ""
+                };
+                format!(
+                    "{fails}{} of {}; {}",
+                    case["failures"],
+                    case["trials"],
+                    short(&case["worst"])
+                )
             })
             .collect();
         lines.push(format!(
