@@ -41,8 +41,8 @@ pub enum Error {
 }
 
 impl Error {
-    /// The exit code of the process: 2 for what the user can correct in the input, 130 or 143
-    /// after a signal, else 1.
+    /// The exit code of the process: 2 for what the user can correct in the input, 129, 130
+    /// or 143 after a signal, else 1.
     #[must_use]
     pub fn exit_code(&self) -> u8 {
         match self {

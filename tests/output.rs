@@ -728,6 +728,7 @@ fn statistics() -> Stats {
         estimated_error: None,
         black: false,
         non_finite: 0,
+        first_non_finite: None,
         bounce_limit: stats::BounceLimit {
             throughput: f64::INFINITY,
             ..Default::default()
@@ -764,6 +765,7 @@ fn statistics_are_valid_json() {
         "rays",
         "estimated_error",
         "non_finite",
+        "first_non_finite",
         "stopped_by",
         "version",
         "max_bounces",

@@ -3,9 +3,11 @@
 mod args;
 mod devices;
 mod effects;
+mod fault;
 mod render;
 mod scene;
 mod shell;
+mod signals;
 mod values;
 
 use std::io::Write as _;
@@ -30,8 +32,8 @@ Examples:
   gpu-trace my.toml --error 1% --time 2m       until the error is 1 % or two minutes are over
   gpu-trace effects my.toml                    what the kernel will hold, and why
 
-Exit codes: 0 done; 1 failed; 2 wrong usage or a bad scene; 130 or 143 ended by a signal, with what
-there was written.";
+Exit codes: 0 done; 1 failed; 2 wrong usage or a bad scene; 129, 130 or 143 ended by a signal, with
+what there was written.";
 
 /// Path-traces scenes made of spheres on a GPU, without a display.
 ///

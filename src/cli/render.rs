@@ -1,15 +1,16 @@
 //! `gpu-trace render`: from a scene file to images.
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use super::args::{BackendArg, RenderArgs};
+use super::fault::Faulty;
+use super::signals::Signals;
 use super::{derive, print};
 use crate::effects::Effects;
 use crate::error::{Error, Result};
 use crate::estimate::energy_cut_at_most;
+use crate::film::NonFinite;
 use crate::gpu::device::{self, DRIVER_ADVICE, DeviceChoice, Gpu};
 use crate::gpu::renderer::GpuRenderer;
 use crate::output::stats::{BounceLimit, Device, Seconds};
@@ -76,6 +77,9 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
     progress.finish();
 
     warnings.extend(observations(&outcome, &job.settings));
+    if args.allow_non_finite {
+        warnings.extend(not_finite(&outcome));
+    }
     for warning in &warnings[said..] {
         progress.warning(warning);
     }
@@ -99,24 +103,60 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
         warnings,
         ..stats
     };
-    finish(args, &job, &outcome, &stats)?;
-    if let Some(failure) = outcome.failure {
-        return Err(failure);
+    let written = finish(args, &job, &outcome, &stats);
+    if let Some(failure) = &outcome.failure {
+        return Err(failed(failure, &outcome, &job, written));
     }
-    if let Some(first) = outcome.film.tally().first_non_finite {
+    written?;
+    if let Some(text) = not_finite(&outcome).filter(|_| !args.allow_non_finite) {
         return Err(Error::NonFinite(format!(
-            "{} samples were not finite and are in no sum; the first: pixel ({}, {}), sample {}, \
-             after bounce {}",
-            outcome.film.tally().non_finite,
-            first.pixel[0],
-            first.pixel[1],
-            first.sample,
-            first.bounce
+            "{text} (--allow-non-finite makes this a warning)"
         )));
     }
     signals
         .code()
         .map_or(Ok(()), |code| Err(Error::Interrupted(code)))
+}
+
+/// A failure in the middle of a render, with what became of the samples before it.
+fn failed(failure: &Error, outcome: &Outcome, job: &Job, written: Result<()>) -> Error {
+    let saved = match (outcome.film.samples(), written) {
+        (0, _) => "no samples were done, and no file was changed".to_owned(),
+        (spp, Ok(())) => format!(
+            "the {spp} samples a pixel done before are in {}",
+            job.files()
+        ),
+        (_, Err(error)) => error.to_string(),
+    };
+    Error::Gpu(format!("{failure}; {saved}"))
+}
+
+/// What to say of samples that were not finite; `None` without any.
+fn not_finite(outcome: &Outcome) -> Option<String> {
+    let tally = outcome.film.tally();
+    (tally.non_finite > 0).then(|| {
+        let first = tally.first_non_finite.map_or_else(String::new, place);
+        format!(
+            "{} samples were not finite and are in no sum; {first}",
+            tally.non_finite
+        )
+    })
+}
+
+fn place(first: NonFinite) -> String {
+    let [x, y] = first.pixel;
+    format!(
+        "the first: pixel ({x}, {y}), sample {}, after bounce {}",
+        first.sample, first.bounce
+    )
+}
+
+impl Job {
+    /// The images, as they were typed.
+    fn files(&self) -> String {
+        let files: Vec<String> = self.targets.iter().map(ToString::to_string).collect();
+        files.join(", ")
+    }
 }
 
 /// Loads and decides everything; checks the outputs. Touches no device and no file.
@@ -195,7 +235,8 @@ fn open(args: &RenderArgs, warnings: &mut Vec<String>) -> Result<Option<Gpu>> {
 
 fn renderer(gpu: Option<Gpu>, args: &RenderArgs, job: &Job) -> Result<Box<dyn Renderer>> {
     let (scene, placement, settings) = (&job.loaded.scene, &job.placement, &job.settings);
-    Ok(match gpu {
+    let device = gpu.clone().filter(|_| args.inject_fault.is_some());
+    let renderer: Box<dyn Renderer> = match gpu {
         Some(gpu) => Box::new(GpuRenderer::new(
             gpu,
             scene,
@@ -207,6 +248,10 @@ fn renderer(gpu: Option<Gpu>, args: &RenderArgs, job: &Job) -> Result<Box<dyn Re
             let threads = args.threads.map_or(0, usize::from);
             Box::new(ReferenceRenderer::new(scene, placement, settings, threads)?)
         }
+    };
+    Ok(match args.inject_fault {
+        Some(fault) => Box::new(Faulty::new(renderer, device, fault)?),
+        None => renderer,
     })
 }
 
@@ -266,6 +311,7 @@ fn statistics(job: &Job, outcome: &Outcome, backend: &str, device: Device) -> St
         estimated_error: outcome.estimate.error,
         black: outcome.estimate.is_black(),
         non_finite: tally.non_finite,
+        first_non_finite: tally.first_non_finite,
         bounce_limit: BounceLimit {
             paths: tally.cut_paths,
             throughput: tally.cut_throughput,
@@ -308,7 +354,6 @@ fn finish(args: &RenderArgs, job: &Job, outcome: &Outcome, stats: &Stats) -> Res
 
 /// One line.
 fn summary(job: &Job, stats: &Stats) -> String {
-    let files: Vec<String> = job.targets.iter().map(ToString::to_string).collect();
     let error = match stats.estimated_error {
         Some(error) => format!("error {}", percent(error)),
         None if stats.black => "black".into(),
@@ -319,6 +364,7 @@ fn summary(job: &Job, stats: &Stats) -> String {
         StoppedBy::Error => ", error reached",
         StoppedBy::Time => ", time is up",
         StoppedBy::Interrupt => ", interrupted",
+        StoppedBy::Failure => ", failed",
     };
     let limit = &stats.bounce_limit;
     let cut = match (limit.paths, limit.energy_at_most) {
@@ -329,9 +375,16 @@ fn summary(job: &Job, stats: &Stats) -> String {
         ),
         (paths, None) => format!(", bounce limit cut {paths} paths"),
     };
+    let lost = stats.first_non_finite.map_or_else(String::new, |first| {
+        format!(
+            ", {} samples not finite ({})",
+            stats.non_finite,
+            place(first)
+        )
+    });
     format!(
-        "{}: {}x{}, {} spp{stopped}, {error}{cut}, {:.2} s, {} Mpaths/s on {}\n",
-        files.join(", "),
+        "{}: {}x{}, {} spp{stopped}, {error}{cut}{lost}, {:.2} s, {} Mpaths/s on {}\n",
+        job.files(),
         stats.width,
         stats.height,
         stats.spp,
@@ -369,41 +422,6 @@ fn write_file(path: &Path, bytes: &[u8]) -> Result<()> {
         },
         other => other,
     })
-}
-
-/// SIGINT and SIGTERM: the first asks to stop, the second ends the process.
-struct Signals {
-    interrupt: Arc<AtomicBool>,
-    terminate: Arc<AtomicBool>,
-}
-
-impl Signals {
-    fn listen() -> Result<Self> {
-        use signal_hook::consts::{SIGINT, SIGTERM};
-        let signals = Self {
-            interrupt: Arc::default(),
-            terminate: Arc::default(),
-        };
-        let register = |signal, flag: &Arc<AtomicBool>| {
-            signal_hook::flag::register_conditional_shutdown(
-                signal,
-                128 + signal,
-                Arc::clone(flag),
-            )?;
-            signal_hook::flag::register(signal, Arc::clone(flag))
-        };
-        register(SIGINT, &signals.interrupt)
-            .and_then(|_| register(SIGTERM, &signals.terminate))
-            .map_err(|e| Error::Usage(format!("cannot listen for signals: {e}")))?;
-        Ok(signals)
-    }
-
-    fn code(&self) -> Option<i32> {
-        if self.terminate.load(Ordering::Relaxed) {
-            return Some(143);
-        }
-        self.interrupt.load(Ordering::Relaxed).then_some(130)
-    }
 }
 
 /// Shows the render loop's status, and asks for signals.

@@ -7,6 +7,7 @@ use serde::Serialize;
 
 use super::{Metadata, atomic};
 use crate::error::{Error, Result};
+pub use crate::film::NonFinite;
 pub use crate::render::StoppedBy;
 
 /// All that is known of a finished render. The names are those of the JSON, which users' scripts
@@ -57,8 +58,10 @@ pub struct Stats {
     pub estimated_error: Option<f64>,
     /// Whether no light at all was found, which leaves the error without meaning.
     pub black: bool,
-    /// Samples that were not finite.
+    /// Samples that were not finite; they are in no sum.
     pub non_finite: u64,
+    /// The first of these; `null` without any.
+    pub first_non_finite: Option<NonFinite>,
     /// What the limit on bounces cut off.
     pub bounce_limit: BounceLimit,
     /// What ended the render.
