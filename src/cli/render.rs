@@ -175,7 +175,7 @@ fn prepare(args: &RenderArgs) -> Result<Job> {
     outputs.extend(args.stats.as_deref());
     outputs.extend(args.dump_wgsl.as_deref());
     check_all(&outputs, args.scene_file().as_slice())?;
-    check_memory(&settings.crop)?;
+    check_memory(&settings.crop, PIXEL_BYTES)?;
     let (placement, effects) = derive(&loaded.scene, &settings)?;
     Ok(Job {
         loaded,
@@ -188,10 +188,12 @@ fn prepare(args: &RenderArgs) -> Result<Job> {
 
 /// Bytes of memory that a pixel takes: 48 each in film and window, and room for the files.
 const PIXEL_BYTES: usize = 128;
+/// The same with the CPU reference, whose sums in the middle of a window are larger.
+const CPU_PIXEL_BYTES: usize = 256;
 
 /// Refuses an image that would end the program in the middle for want of memory.
-fn check_memory(crop: &Rect) -> Result<()> {
-    let bytes = crop.pixels().saturating_mul(PIXEL_BYTES);
+fn check_memory(crop: &Rect, pixel_bytes: usize) -> Result<()> {
+    let bytes = crop.pixels().saturating_mul(pixel_bytes);
     let mut room: Vec<u8> = Vec::new();
     let there = room.try_reserve_exact(bytes).is_ok();
     // Without this, the compiler may leave the allocation out and assume that it works.
@@ -200,11 +202,11 @@ fn check_memory(crop: &Rect) -> Result<()> {
         return Ok(());
     }
     Err(Error::Usage(format!(
-        "{}x{} pixels need {:.1} GiB of memory, more than there is: choose a smaller --size, or \
+        "{}x{} pixels need {} GiB of memory, more than there is: choose a smaller --size, or \
          render parts of the image with --crop",
         crop.width,
         crop.height,
-        bytes as f64 / f64::from(1 << 30),
+        significant(bytes as f64 / f64::from(1 << 30)),
     )))
 }
 
@@ -236,19 +238,19 @@ fn open(args: &RenderArgs, warnings: &mut Vec<String>) -> Result<Option<Gpu>> {
 fn renderer(gpu: Option<Gpu>, args: &RenderArgs, job: &Job) -> Result<Box<dyn Renderer>> {
     let (scene, placement, settings) = (&job.loaded.scene, &job.placement, &job.settings);
     let device = gpu.clone().filter(|_| args.inject_fault.is_some());
-    let renderer: Box<dyn Renderer> = match gpu {
-        Some(gpu) => Box::new(GpuRenderer::new(
-            gpu,
-            scene,
-            placement,
-            &job.effects,
-            settings,
-        )?),
+    let (renderer, pixel_bytes): (Box<dyn Renderer>, _) = match gpu {
+        Some(gpu) => {
+            let renderer = GpuRenderer::new(gpu, scene, placement, &job.effects, settings)?;
+            (Box::new(renderer), PIXEL_BYTES)
+        }
         None => {
             let threads = args.threads.map_or(0, usize::from);
-            Box::new(ReferenceRenderer::new(scene, placement, settings, threads)?)
+            let renderer = ReferenceRenderer::new(scene, placement, settings, threads)?;
+            (Box::new(renderer), CPU_PIXEL_BYTES)
         }
     };
+    // Again, after the driver has taken its part.
+    check_memory(&settings.crop, pixel_bytes)?;
     Ok(match args.inject_fault {
         Some(fault) => Box::new(Faulty::new(renderer, device, fault)?),
         None => renderer,

@@ -249,14 +249,21 @@ pub fn open(choice: &DeviceChoice) -> Result<Gpu> {
 #[derive(Clone, Debug, Default)]
 struct Faults(Arc<Mutex<Vec<String>>>);
 
+const OUT_OF_MEMORY: &str = "the device is out of memory";
+
 impl Faults {
     fn list(&self) -> MutexGuard<'_, Vec<String>> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn report(&self, error: &wgpu::Error) {
-        self.list().push(match error {
-            wgpu::Error::OutOfMemory { .. } => "the device is out of memory".to_owned(),
+        let mut list = self.list();
+        // What has no memory is invalid from then on, which every use of it would report again.
+        if list.last().is_some_and(|last| last == OUT_OF_MEMORY) {
+            return;
+        }
+        list.push(match error {
+            wgpu::Error::OutOfMemory { .. } => OUT_OF_MEMORY.to_owned(),
             other => format!("the device reports: {other}"),
         });
     }
