@@ -51,7 +51,7 @@ pub(crate) fn all(tables: &[String]) -> Result<(), String> {
 }
 
 /// The program, as cargo has built it.
-fn program() -> PathBuf {
+pub(crate) fn program() -> PathBuf {
     let target =
         std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| "target".into(), PathBuf::from);
     target.join("release/gpu-trace")

@@ -1,6 +1,7 @@
-//! Tasks of the project: `cargo xtask test`, `cargo xtask bench`.
+//! Tasks of the project: `cargo xtask test`, `cargo xtask bench`, `cargo xtask soak`.
 
 mod bench;
+mod soak;
 mod test;
 
 use std::process::{Command, ExitCode};
@@ -10,6 +11,7 @@ Usage: cargo xtask TASK
 
   test     install what the tests need (Mesa lavapipe), check format and lints, run every test
   bench    run the benchmarks side by side and print their table (--help for its options)
+  soak     render for 30 minutes, or as many as are named, and fail if memory grows
 ";
 
 fn main() -> ExitCode {
@@ -19,6 +21,7 @@ fn main() -> ExitCode {
     let done = match task.as_deref() {
         Some("test") => test::all(&rest),
         Some("bench") => bench::all(&rest),
+        Some("soak") => soak::all(&rest),
         Some("help" | "--help" | "-h") => {
             print!("{USAGE}");
             Ok(())
