@@ -93,6 +93,7 @@ fn watch(child: &mut Child, seconds: f64) -> Vec<Sample> {
     let mut samples = Vec::new();
     // The end of a render, when the image is written, is not part of it.
     while begin.elapsed().as_secs_f64() < 0.98 * seconds && matches!(child.try_wait(), Ok(None)) {
+        sleep(pause);
         if let Some(megabytes) = resident(child.id()) {
             let minute = begin.elapsed().as_secs_f64() / 60.0;
             if minute >= next {
@@ -101,7 +102,6 @@ fn watch(child: &mut Child, seconds: f64) -> Vec<Sample> {
             }
             samples.push(Sample { minute, megabytes });
         }
-        sleep(pause);
     }
     samples
 }
