@@ -175,6 +175,41 @@ fn a_scene_beyond_the_devices_limits_is_an_error() {
     assert!(with_at_most(1 << 20).is_ok());
 }
 
+#[test]
+fn a_scene_of_too_many_magnitudes_is_an_error() {
+    let folder = Folder::new();
+    let scene = |camera: &str, radius: &str| {
+        format!(
+            "camera = {{ {camera}, look_at = [0, 0, 0], fov = 40 }}
+             image = {{ width = 4, height = 4 }}
+             environment = {{ radiance = [1, 1, 1] }}
+             material.a = {{ type = \"diffuse\", albedo = [1, 1, 1] }}
+             sphere = [
+                 {{ center = [1, 0, 0], radius = 1, material = \"a\" }},
+                 {{ center = [0, 0, 0], radius = {radius}, material = \"a\" }},
+             ]"
+        )
+    };
+    let near = "position = [0, 0, -1]";
+    let far = "position = [0, 0, -1e20]";
+    let lens = "position = [0, 0, -1], aperture_radius = 1e-3, focus_distance = 1e-50";
+    for (camera, radius, part) in [
+        (near, "1e-61", "the radius of sphere 2 "),
+        (near, "1e-300", "the radius of sphere 2 "),
+        (lens, "0.1", "the camera's lens "),
+    ] {
+        folder.write("bad.toml", scene(camera, radius));
+        for command in [&["effects", "bad.toml"][..], &["bad.toml", "-o", "r.npy"]] {
+            holds(&folder.refused(command), &["error: ", part, "magnitude"]);
+        }
+    }
+    // What f32 holds is rendered.
+    for (camera, radius) in [(near, "1e-37"), (far, "1e-10"), (near, "1")] {
+        folder.write("good.toml", scene(camera, radius));
+        folder.ok("good.toml --spp 1 -o r.npy");
+    }
+}
+
 /// Runs the program under `limits`, shell commands.
 fn limited(folder: &Folder, limits: &str, arguments: &str) -> Run {
     let mut command = Command::new("sh");

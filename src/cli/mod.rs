@@ -186,8 +186,40 @@ fn derive(scene: &Scene, settings: &Settings) -> Result<(Placement, Effects)> {
             placement.media.levels
         )));
     }
+    check_magnitudes(&placement)?;
     let effects = Effects::derive(scene, &placement, settings);
     Ok((placement, effects))
+}
+
+/// Refuses what the kernel's f32 cannot hold in the scene's own unit: next to a sphere of radius 1e20,
+/// one of radius 1e-20 has no size left.
+fn check_magnitudes(placement: &Placement) -> Result<()> {
+    let refuse = |what: &str| {
+        Err(Error::Scene(format!(
+            "{what} in units of the whole scene is a number that the device cannot hold: the \
+             scene's lengths lie too many orders of magnitude apart"
+        )))
+    };
+    for sphere in &placement.spheres {
+        let radius = sphere.radius as f32;
+        // The kernel needs the inverse, too.
+        if !radius.is_normal() || !radius.recip().is_normal() {
+            return refuse(&format!("the radius of sphere {}", sphere.source + 1));
+        }
+        if !sphere.anchor.as_vec3().is_finite() {
+            return refuse(&format!("the center of sphere {}", sphere.source + 1));
+        }
+    }
+    let camera = &placement.camera;
+    if !(camera.approach as f32).is_finite() {
+        return refuse("the camera's distance from the scene");
+    }
+    let lens = [camera.lens_across, camera.lens_down].map(|axis| axis.as_vec3());
+    let focus = [camera.focus as f32, camera.lens_share as f32];
+    if !lens.iter().all(|axis| axis.is_finite()) || !focus.iter().all(|x| x.is_finite()) {
+        return refuse("the camera's lens");
+    }
+    Ok(())
 }
 
 /// Prints a result. A reader that has seen enough (`| head`) is no error.
