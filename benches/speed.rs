@@ -5,10 +5,12 @@
 //! of several rounds. Nothing is asserted.
 
 mod naive;
+mod offsets;
 
 use std::time::Instant;
 
 use gpu_trace::effects::Effects;
+use gpu_trace::film::Film;
 use gpu_trace::gpu::device::{self, DeviceChoice};
 use gpu_trace::gpu::renderer::GpuRenderer;
 use gpu_trace::placement::Placement;
@@ -40,6 +42,9 @@ fn main() {
     if chosen("geometry") {
         geometry_forms();
     }
+    if chosen("offsets") {
+        offsets::run();
+    }
 }
 
 fn scene(name: &str) -> Scene {
@@ -60,7 +65,7 @@ fn ours(
     let mut settings = Settings::for_scene(scene);
     settings.samples = 0..SPP;
     change(&mut settings);
-    let placement = Placement::new(scene, settings.width, settings.height);
+    let placement = Placement::with_offset(scene, settings.width, settings.height, settings.offset);
     let mut effects = Effects::derive(scene, &placement, &settings);
     if !with.is_empty() {
         let names: Vec<&'static str> = effects.names().chain(with.iter().copied()).collect();
@@ -76,6 +81,17 @@ fn ours(
         render_quietly(&mut renderer, &settings).unwrap_or_else(|e| panic!("{e}"));
         (paths, begin.elapsed().as_secs_f64())
     })
+}
+
+/// One render by our kernel.
+fn film_of(scene: &Scene, settings: &Settings) -> Film {
+    let placement = Placement::with_offset(scene, settings.width, settings.height, settings.offset);
+    let effects = Effects::derive(scene, &placement, settings);
+    let gpu = device::open(&DeviceChoice::Best).unwrap_or_else(|e| panic!("{e}"));
+    let mut renderer = GpuRenderer::new(gpu, scene, &placement, &effects, settings)
+        .unwrap_or_else(|e| panic!("{e}"));
+    let outcome = render_quietly(&mut renderer, settings).unwrap_or_else(|e| panic!("{e}"));
+    outcome.film
 }
 
 /// Runs all in turns and prints a table with ratios to the first.

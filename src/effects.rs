@@ -4,9 +4,9 @@
 //! are dropped from the shared structs, its branches and bindings are gone. The kernel's sources
 //! (`shaders/`) name effects in `@if(...)`; [`Effects::flags`] says which are on.
 
-use crate::placement::{Placement, Side};
+use crate::placement::{PlacedSphere, Placement, Side};
 use crate::scene::{MaterialKind, Scene};
-use crate::settings::{GeometryChoice, Integrator, Settings};
+use crate::settings::{GeometryChoice, Integrator, Offset, Settings};
 
 /// Spheres up to which they are baked into the kernel as constants: measured, see
 /// `benches/RESULTS.md`.
@@ -48,13 +48,14 @@ impl Effects {
     #[must_use]
     pub fn derive(scene: &Scene, placement: &Placement, settings: &Settings) -> Self {
         let surfaces = |wanted: &dyn Fn(&crate::scene::Material) -> bool| {
-            reasons(scene.spheres.iter().enumerate().filter_map(|(i, sphere)| {
+            reasons(in_order(placement).filter_map(|sphere| {
                 let material = &scene.materials[sphere.material];
-                wanted(material).then(|| format!("sphere {} ({})", i + 1, material.name))
+                let name = &material.name;
+                wanted(material).then(|| format!("sphere {} ({name})", sphere.source + 1))
             }))
         };
         let kind = |wanted: &dyn Fn(&MaterialKind) -> bool| surfaces(&|m| wanted(&m.kind));
-        let placed = |wanted: &dyn Fn(&crate::placement::PlacedSphere) -> Option<&'static str>| {
+        let placed = |wanted: &dyn Fn(&PlacedSphere) -> Option<&'static str>| {
             reasons(placement.spheres.iter().filter_map(|sphere| {
                 let material = &scene.materials[sphere.material];
                 wanted(sphere)
@@ -63,7 +64,9 @@ impl Effects {
         };
         let when = |condition: bool, reason: String| if condition { vec![reason] } else { vec![] };
 
-        let count = scene.spheres.len();
+        let count = placement.spheres.len();
+        let exact = settings.offset == Offset::Exact;
+        let nudged = || format!("--offset {}", settings.offset);
         let baked = match settings.geometry {
             GeometryChoice::Auto => count <= BAKED_LIMIT,
             GeometryChoice::Baked => true,
@@ -96,8 +99,35 @@ impl Effects {
                 reasons: placed(&|s| match s.side {
                     Side::Outside => None,
                     Side::Inside => Some(", which the camera is in"),
-                    Side::Either => Some(", which has two sides"),
+                    Side::Tracked => Some(", which has two sides"),
+                    Side::Sign => Some(", which paths may be on both sides of"),
                 }),
+            },
+            Effect {
+                name: "straddle",
+                what: "surfaces of which only a sign tells on which side a path is",
+                reasons: if exact {
+                    placed(&|s| {
+                        (s.side == Side::Sign).then_some(", which the lens is on both sides of")
+                    })
+                } else {
+                    when(count > 0, nudged())
+                },
+            },
+            Effect {
+                name: "nested",
+                what: "surfaces just within those of dielectrics",
+                reasons: placed(&|s| s.container.map(|_| ", which lies just within a dielectric")),
+            },
+            Effect {
+                name: "nudge",
+                what: "hits as points, moved off the surface by a distance",
+                reasons: when(settings.offset.distances().is_some(), nudged()),
+            },
+            Effect {
+                name: "ulp",
+                what: "hits as points, moved off the surface by some ulp",
+                reasons: when(settings.offset == Offset::Ulp, nudged()),
             },
             Effect {
                 name: "lens",
@@ -226,6 +256,13 @@ impl Effects {
     pub fn geometry(&self) -> &'static str {
         if self.has("baked") { "baked" } else { "list" }
     }
+}
+
+/// The spheres in scene order.
+fn in_order(placement: &Placement) -> impl Iterator<Item = &PlacedSphere> {
+    let mut spheres: Vec<&PlacedSphere> = placement.spheres.iter().collect();
+    spheres.sort_by_key(|s| s.source);
+    spheres.into_iter()
 }
 
 /// The first few of `all`, and how many more there are.

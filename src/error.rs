@@ -35,14 +35,17 @@ pub enum Error {
     /// The estimate holds values that are not finite.
     #[error("{0}")]
     NonFinite(String),
+    /// A hard case failed on the device.
+    #[error("{0}")]
+    Check(String),
     /// The program was told to stop.
     #[error("interrupted")]
     Interrupted(i32),
 }
 
 impl Error {
-    /// The exit code of the process: 2 for what the user can correct in the input, 129, 130
-    /// or 143 after a signal, else 1.
+    /// The exit code of the process: 2 for what the user can correct in the input, 129, 130 or 143
+    /// after a signal, 3 if a check failed, else 1.
     #[must_use]
     pub fn exit_code(&self) -> u8 {
         match self {
@@ -52,6 +55,7 @@ impl Error {
                 action: "cannot read",
                 ..
             } => 2,
+            Self::Check(_) => 3,
             Self::Interrupted(code) => u8::try_from(*code).unwrap_or(1),
             _ => 1,
         }

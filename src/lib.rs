@@ -7,7 +7,7 @@
 //! 2. [`settings`]: what will be rendered, validated.
 //! 3. [`scene`]: the scene file, validated.
 //! 4. [`placement`]: where everything is, in f64, relative to where the picture is.
-//!    [`media`]: which of several dielectrics fills the space.
+//!    [`media`]: which of several dielectrics fills the space. [`containment`]: what lies in what.
 //! 5. [`effects`]: what the scene asks for; nothing else goes into the kernel.
 //! 6. [`shader`]: the kernel, linked for these effects from `shaders/`.
 //! 7. [`gpu`] and [`reference`](mod@reference): two renderers, wgpu in f32 and the CPU in f64, that
@@ -17,9 +17,12 @@
 //! 10. [`estimate`]: mean and error.
 //! 11. [`output`]: images, statistics, progress.
 //!
+//! [`check`] measures the hard cases of all this on a device, with the tests of [`statistics`].
 //! [`error`] is what can go wrong anywhere.
 
+pub mod check;
 pub mod cli;
+pub mod containment;
 pub mod effects;
 pub mod error;
 pub mod estimate;
@@ -33,3 +36,4 @@ pub mod render;
 pub mod scene;
 pub mod settings;
 pub mod shader;
+pub mod statistics;

@@ -2,6 +2,8 @@
 //!
 //! Part of the placement: geometry in f64, decided once.
 
+use std::cmp::Ordering;
+
 use glam::DVec3;
 
 use crate::scene::{MaterialKind, Scene};
@@ -17,10 +19,21 @@ pub struct Media {
     /// Level of each sphere of the scene; two dielectrics that share a point differ, and the higher
     /// one fills it. 0 for what is no dielectric.
     pub level: Vec<u32>,
-    /// Level and refractive index of the dielectrics that the camera is in.
-    pub camera: Vec<(u32, f64)>,
+    /// The dielectrics that the camera is in, `sphere` being the scene's index.
+    pub camera: Vec<Medium>,
     /// The first two spheres found to share a point.
     pub example: Option<[usize; 2]>,
+}
+
+/// A dielectric that a path is in.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Medium {
+    /// Its precedence.
+    pub level: u32,
+    /// Its refractive index.
+    pub ior: f64,
+    /// Its sphere.
+    pub sphere: usize,
 }
 
 struct Ball {
@@ -28,7 +41,6 @@ struct Ball {
     center: DVec3,
     radius: f64,
     ior: f64,
-    priority: i32,
 }
 
 impl Ball {
@@ -39,32 +51,26 @@ impl Ball {
 
 impl Media {
     /// The precedence of the dielectrics of `scene`: the higher `priority` (0 if there is none),
-    /// then the smaller radius, then the lower index.
+    /// then the smaller radius, then the lower index; those that are not `reachable` are not there.
     #[must_use]
-    pub fn new(scene: &Scene) -> Self {
+    pub fn new(scene: &Scene, reachable: &[bool]) -> Self {
         let mut balls: Vec<Ball> = scene
             .spheres
             .iter()
             .enumerate()
+            .filter(|(source, _)| reachable[*source])
             .filter_map(|(source, s)| match scene.materials[s.material].kind {
                 MaterialKind::Dielectric { ior } => Some(Ball {
                     source,
                     center: s.center - scene.camera.position,
                     radius: s.radius,
                     ior,
-                    priority: s.priority.unwrap_or(0),
                 }),
                 _ => None,
             })
             .collect();
         // From low to high precedence.
-        balls.sort_by(|a, b| {
-            let order = a
-                .priority
-                .cmp(&b.priority)
-                .then(b.radius.total_cmp(&a.radius));
-            order.then(b.source.cmp(&a.source))
-        });
+        balls.sort_by(|a, b| precedence(scene, a.source, b.source));
         let neighbours = neighbours(&balls);
         let mut media = Self {
             level: vec![0; scene.spheres.len()],
@@ -83,11 +89,32 @@ impl Media {
                 media.example.get_or_insert([ball.source, balls[*j].source]);
             }
             if ball.center.length() < ball.radius {
-                media.camera.push((level, ball.ior));
+                media.camera.push(Medium {
+                    level,
+                    ior: ball.ior,
+                    sphere: ball.source,
+                });
             }
         }
         media
     }
+}
+
+/// The order of two dielectrics of `scene`, from low to high precedence.
+fn precedence(scene: &Scene, a: usize, b: usize) -> Ordering {
+    let (first, second) = (&scene.spheres[a], &scene.spheres[b]);
+    let priority = first
+        .priority
+        .unwrap_or(0)
+        .cmp(&second.priority.unwrap_or(0));
+    let order = priority.then(second.radius.total_cmp(&first.radius));
+    order.then(b.cmp(&a))
+}
+
+/// Whether dielectric `a` of `scene` fills the space that it shares with dielectric `b`.
+#[must_use]
+pub fn precedes(scene: &Scene, a: usize, b: usize) -> bool {
+    precedence(scene, a, b) == Ordering::Greater
 }
 
 /// For each ball the others that share a point with it: a sweep along x.

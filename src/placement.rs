@@ -8,22 +8,31 @@
 
 use glam::DVec3;
 
-use crate::media::Media;
+use crate::containment::{containers, reachable};
+use crate::media::{Media, Medium};
 use crate::scene::{Handedness, MaterialKind, Scene};
+use crate::settings::Offset;
 
 /// A scene's spheres and camera as the renderers use them.
 #[derive(Clone, Debug)]
 pub struct Placement {
     /// Kernel units per scene unit, a power of two.
     pub scale: f64,
-    /// All spheres, those with a pole frame first, else in scene order.
+    /// Kernel radiance per radiance, a power of two that brings the brightest light to 2^32: sums of
+    /// squares in f32 then hold light of 1e20, and beside it light a 1e-29 of that.
+    pub light: f64,
+    /// The spheres that paths can reach, those with a pole frame first, else in scene order.
     pub spheres: Vec<PlacedSphere>,
     /// How many of `spheres` have a pole frame.
     pub poles: usize,
     /// Which dielectrics take precedence where they share points.
     pub media: Media,
+    /// The dielectrics that the camera is in, `sphere` being an index into `spheres`.
+    pub within: Vec<Medium>,
     /// The camera.
     pub camera: PlacedCamera,
+    /// How paths leave surfaces, distances in kernel units.
+    pub offset: Offset,
 }
 
 /// A sphere in kernel units, relative to the placement's origin.
@@ -43,12 +52,19 @@ pub struct PlacedSphere {
     pub side: Side,
     /// Precedence among dielectrics that share points; see [`Media`].
     pub level: u32,
+    /// The dielectric that this sphere lies just within, an index into the placement's spheres:
+    /// this sphere is hit only from within that.
+    pub container: Option<usize>,
+    /// The dielectric that lies just within this sphere, an index into the placement's spheres: from
+    /// within that, this sphere is not hit.
+    pub core: Option<usize>,
 }
 
 /// Which side of a sphere's surface paths can be on.
 ///
-/// No path crosses an opaque surface, so its side is that of the camera, once and for all: what
-/// f32 says about a point near the surface is not asked.
+/// No path crosses an opaque surface, so its side is that of the camera, once and for all; and a
+/// path that crosses a dielectric's surface knows it. What f32 says about a point near the surface
+/// is not asked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum Side {
@@ -56,8 +72,11 @@ pub enum Side {
     Outside = 0,
     /// Only inside.
     Inside = 1,
-    /// Both: a dielectric, or a surface that the lens straddles.
-    Either = 2,
+    /// Both: a dielectric. The path keeps account of it.
+    Tracked = 2,
+    /// Both, and only the sign of the ray's distance tells: a surface that the lens straddles, or
+    /// any surface where paths leave by a nudge ([`Offset`]).
+    Sign = 3,
 }
 
 /// The camera: rays start at `anchor + lens_share lens + approach film` in the direction
@@ -97,6 +116,12 @@ impl Placement {
     /// Prepares `scene` for an image of `width` x `height` pixels.
     #[must_use]
     pub fn new(scene: &Scene, width: u32, height: u32) -> Self {
+        Self::with_offset(scene, width, height, Offset::Exact)
+    }
+
+    /// The same for paths that leave surfaces by `offset`.
+    #[must_use]
+    pub fn with_offset(scene: &Scene, width: u32, height: u32, offset: Offset) -> Self {
         let eye = scene.camera.position;
         let forward = (scene.camera.look_at - eye).normalize();
         let approach = approach(scene, forward);
@@ -104,13 +129,34 @@ impl Placement {
         // In units of the origin from here on: the subtraction in f64 is the last place that sees
         // world coordinates.
         let centers: Vec<DVec3> = scene.spheres.iter().map(|s| s.center - origin).collect();
-        let poles: Vec<Option<DVec3>> = (0..centers.len())
-            .map(|i| pole_normal(scene, &centers, i))
-            .collect();
-        let media = Media::new(scene);
-        let scale = unit(scene, &centers, &poles);
-        let mut spheres: Vec<PlacedSphere> = (0..centers.len())
-            .map(|i| {
+        let count = centers.len();
+        let (sides, reachable, containers) = if offset == Offset::Exact {
+            let sides: Vec<Side> = (0..count).map(|i| side(scene, i)).collect();
+            let reachable = reachable(scene, &sides);
+            let containers = containers(scene, &sides, &reachable);
+            (sides, reachable, containers)
+        } else {
+            (
+                vec![Side::Sign; count],
+                vec![true; count],
+                vec![None; count],
+            )
+        };
+        let media = Media::new(scene, &reachable);
+        let mut order: Vec<usize> = (0..count).filter(|i| reachable[*i]).collect();
+        let mut poles = vec![None; count];
+        for &i in &order {
+            poles[i] = pole_normal(scene, &centers, &order, i);
+        }
+        let scale = unit(scene, &centers, &poles, &order);
+        order.sort_by_key(|i| (poles[*i].is_none(), *i));
+        let mut place = vec![None; count];
+        for (at, source) in order.iter().enumerate() {
+            place[*source] = Some(at);
+        }
+        let mut spheres: Vec<PlacedSphere> = order
+            .iter()
+            .map(|&i| {
                 let sphere = &scene.spheres[i];
                 let normal = poles[i];
                 let anchor =
@@ -121,21 +167,52 @@ impl Placement {
                     anchor: anchor * scale,
                     radius: sphere.radius * scale,
                     pole: normal,
-                    side: side(scene, i),
+                    side: sides[i],
                     level: media.level[i],
+                    container: containers[i].and_then(|c| place[c]),
+                    core: None,
                 }
             })
             .collect();
-        spheres.sort_by_key(|s| (s.pole.is_none(), s.source));
+        for inner in 0..spheres.len() {
+            if let Some(outer) = spheres[inner].container
+                && spheres[inner].side == Side::Tracked
+            {
+                spheres[outer].core = Some(inner);
+            }
+        }
+        let within = media.camera.iter().filter_map(|medium| {
+            let sphere = place[medium.sphere]?;
+            Some(Medium { sphere, ..*medium })
+        });
+        let within = within.collect();
         let poles = spheres.iter().filter(|s| s.pole.is_some()).count();
         let camera = place_camera(scene, forward, approach, scale, width, height);
         Self {
             scale,
+            light: light(scene, &order),
             spheres,
             poles,
             media,
+            within,
             camera,
+            offset: offset.scaled(scale),
         }
+    }
+}
+
+/// The unit of radiance for the reachable spheres `all`.
+fn light(scene: &Scene, all: &[usize]) -> f64 {
+    let emission = |i: &usize| scene.materials[scene.spheres[*i].material].emission;
+    let brightest = all
+        .iter()
+        .map(emission)
+        .chain(scene.environment)
+        .fold(0.0, |most: f64, radiance| most.max(radiance.max_element()));
+    if brightest > 0.0 {
+        (32.0 - brightest.log2().floor()).exp2()
+    } else {
+        1.0
     }
 }
 
@@ -160,16 +237,17 @@ fn approach(scene: &Scene, forward: DVec3) -> f64 {
 /// The pole's outward normal, if sphere `i` needs a pole frame: there are the camera or much
 /// smaller spheres close to its surface. The pole is the surface point nearest to the middle of
 /// these.
-fn pole_normal(scene: &Scene, centers: &[DVec3], i: usize) -> Option<DVec3> {
+fn pole_normal(scene: &Scene, centers: &[DVec3], all: &[usize], i: usize) -> Option<DVec3> {
     let (center, radius) = (centers[i], scene.spheres[i].radius);
     let small = |j: &usize| *j != i && scene.spheres[*j].radius < POLE_NEAR * radius;
-    if !(0..centers.len()).any(|j| small(&j)) && alone(scene, i) {
+    if !all.iter().any(small) && alone(scene, i) {
         return None;
     }
     let eye = scene.camera.position;
     let eye = eye - (scene.spheres[i].center - center);
     let points = || {
-        (0..centers.len())
+        all.iter()
+            .copied()
             .filter(small)
             .map(|j| (centers[j], scene.spheres[j].radius))
             .chain([(eye, 0.0)])
@@ -203,9 +281,10 @@ fn pole_point(center: DVec3, radius: f64, normal: DVec3) -> DVec3 {
 }
 
 /// The power of two that brings the scene's extent, without the spheres in pole frames, to [1, 2).
-fn unit(scene: &Scene, centers: &[DVec3], poles: &[Option<DVec3>]) -> f64 {
-    let extent = (0..centers.len())
-        .map(|i| match poles[i] {
+fn unit(scene: &Scene, centers: &[DVec3], poles: &[Option<DVec3>], all: &[usize]) -> f64 {
+    let extent = all
+        .iter()
+        .map(|&i| match poles[i] {
             Some(n) => pole_point(centers[i], scene.spheres[i].radius, n).length(),
             None => centers[i].length() + scene.spheres[i].radius,
         })
@@ -219,19 +298,19 @@ fn unit(scene: &Scene, centers: &[DVec3], poles: &[Option<DVec3>]) -> f64 {
 
 fn side(scene: &Scene, i: usize) -> Side {
     let sphere = &scene.spheres[i];
-    if matches!(
-        scene.materials[sphere.material].kind,
-        MaterialKind::Dielectric { .. }
-    ) {
-        return Side::Either;
-    }
     let distance = scene.camera.position.distance(sphere.center);
-    if distance > sphere.radius + scene.camera.aperture_radius {
+    let lens = scene.camera.aperture_radius;
+    if lens > 0.0 && (distance - sphere.radius).abs() <= lens {
+        return Side::Sign;
+    }
+    let kind = scene.materials[sphere.material].kind;
+    if matches!(kind, MaterialKind::Dielectric { .. }) {
+        Side::Tracked
+    } else if distance >= sphere.radius {
+        // A camera on the surface sees it from outside.
         Side::Outside
-    } else if distance < sphere.radius - scene.camera.aperture_radius {
-        Side::Inside
     } else {
-        Side::Either
+        Side::Inside
     }
 }
 

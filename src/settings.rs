@@ -34,6 +34,8 @@ pub struct Settings {
     pub roulette: bool,
     /// The form of the geometry in the kernel.
     pub geometry: GeometryChoice,
+    /// How a path leaves a surface.
+    pub offset: Offset,
     /// Stop when the estimated error is at most this.
     pub error: Option<f64>,
     /// Stop when rendering has taken this long.
@@ -59,6 +61,7 @@ impl Settings {
             integrator: Integrator::Bsdf,
             roulette: true,
             geometry: GeometryChoice::Auto,
+            offset: Offset::Exact,
             error: None,
             time: None,
         }
@@ -131,6 +134,85 @@ pub enum GeometryChoice {
     Baked,
     /// A loop over storage buffers.
     List,
+}
+
+/// How a path leaves a surface without hitting it again.
+///
+/// All but `Exact` are for comparison: a hit is then a point of space in f32, the next ray starts
+/// there, moved as said, and may hit every sphere, its own included.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Offset {
+    /// Not at all: the path knows which sphere it is on, and on which side.
+    #[default]
+    Exact,
+    /// The bare point.
+    None,
+    /// The point, moved back along the ray by a distance in scene units: the lecture's nudge.
+    Back(f64),
+    /// The point, moved along the normal by a distance in scene units, to the side that the path
+    /// goes on to.
+    Out(f64),
+    /// The point, moved along the normal by some hundred ulp: Wächter and Binder 2019.
+    Ulp,
+}
+
+impl Offset {
+    /// Distances back along the ray and out along the normal, in scene units; `None` if it is not
+    /// by a distance.
+    #[must_use]
+    pub fn distances(self) -> Option<[f64; 2]> {
+        match self {
+            Self::None => Some([0.0, 0.0]),
+            Self::Back(x) => Some([x, 0.0]),
+            Self::Out(x) => Some([0.0, x]),
+            Self::Exact | Self::Ulp => None,
+        }
+    }
+
+    /// The same in units of which `scale` make a scene unit.
+    #[must_use]
+    pub fn scaled(self, scale: f64) -> Self {
+        match self {
+            Self::Back(x) => Self::Back(x * scale),
+            Self::Out(x) => Self::Out(x * scale),
+            other => other,
+        }
+    }
+}
+
+impl std::fmt::Display for Offset {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Exact => f.write_str("exact"),
+            Self::None => f.write_str("none"),
+            Self::Back(x) => write!(f, "back:{x:?}"),
+            Self::Out(x) => write!(f, "out:{x:?}"),
+            Self::Ulp => f.write_str("ulp"),
+        }
+    }
+}
+
+impl std::str::FromStr for Offset {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (mode, distance) = text.split_once(':').unwrap_or((text, ""));
+        let parsed = distance.parse::<f64>();
+        match (mode, parsed) {
+            ("exact", _) if mode == text => Ok(Self::Exact),
+            ("none", _) if mode == text => Ok(Self::None),
+            ("ulp", _) if mode == text => Ok(Self::Ulp),
+            ("back" | "out", Ok(x)) if (0.0..=1.0e20).contains(&x) => Ok(if mode == "back" {
+                Self::Back(x)
+            } else {
+                Self::Out(x)
+            }),
+            ("back" | "out", _) => Err(format!(
+                "'{mode}' takes a distance in scene units, from 0 to 1e20, as in {mode}:1e-4"
+            )),
+            _ => Err("exact, none, ulp, back:X or out:X, with a distance X".into()),
+        }
+    }
 }
 
 /// The two words that stand for the seed and the high word of the sample index in the sample

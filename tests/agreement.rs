@@ -9,11 +9,11 @@ mod common;
 
 use std::path::Path;
 
-use common::statistics::mean_and_error;
 use common::{image_bits, means, render_cpu, render_gpu, scene_file, scene_files, settings};
 use gpu_trace::film::Film;
 use gpu_trace::scene::{MaterialKind, Scene};
 use gpu_trace::settings::{GeometryChoice, Integrator, Settings};
+use gpu_trace::statistics::mean_and_error;
 
 /// Bound of the bias of the mean, relative.
 const EQUIVALENT: f64 = 1.0e-3;

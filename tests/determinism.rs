@@ -3,13 +3,13 @@
 
 mod common;
 
-use common::statistics::mean_and_error;
 use common::{U, gpu_renderer, image_bits, means, render_cpu, render_gpu, scene_file, settings};
 use gpu_trace::film::Film;
 use gpu_trace::gpu::renderer::DispatchLimits;
 use gpu_trace::render::render_quietly;
 use gpu_trace::scene::Scene;
 use gpu_trace::settings::{GeometryChoice, Rect, Settings};
+use gpu_trace::statistics::mean_and_error;
 
 /// A scene with all materials, a pole sphere, light and an environment.
 fn glass_ball() -> Scene {

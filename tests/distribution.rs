@@ -9,14 +9,15 @@ mod common;
 use std::f64::consts::{PI, TAU};
 
 use bytemuck::{Pod, Zeroable};
-use common::statistics::{chi_square, normal_p, sidak};
-use common::{Random, Row, probe, probe_of, scene, to_row, vector};
+use common::{Row, probe, probe_of, scene, to_row, vector};
 use glam::{DVec2, DVec3};
+use gpu_trace::check::Random;
 use gpu_trace::gpu::probe::Probe;
 use gpu_trace::placement::Placement;
 use gpu_trace::reference::bsdf::dielectric::fresnel;
 use gpu_trace::reference::bsdf::reflective::{Reflective, lobe_probability, pdf_reflective};
 use gpu_trace::reference::core::sampling::basis_around;
+use gpu_trace::statistics::{chi_square, normal_p, sidak};
 use rayon::prelude::*;
 
 const SAMPLES: usize = 1_000_000;

@@ -10,18 +10,22 @@ use common::{scene, scene_file, scene_files};
 use gpu_trace::effects::Effects;
 use gpu_trace::placement::Placement;
 use gpu_trace::scene::Scene;
-use gpu_trace::settings::{GeometryChoice, Integrator, Settings};
+use gpu_trace::settings::{GeometryChoice, Integrator, Offset, Settings};
 use gpu_trace::shader::{Stage, link};
 use rayon::prelude::*;
 
 type Set = BTreeSet<&'static str>;
 
 /// All effects, in the table's order.
-const ALL: [&str; 15] = [
+const ALL: [&str; 19] = [
     "baked",
     "list",
     "pole",
     "interior",
+    "straddle",
+    "nested",
+    "nudge",
+    "ulp",
     "lens",
     "diffuse",
     "mirror",
@@ -36,17 +40,20 @@ const ALL: [&str; 15] = [
 ];
 
 /// Of these, only one can be in use.
-const EXCLUSIVE: [[&str; 2]; 3] = [
+const EXCLUSIVE: [[&str; 2]; 6] = [
     ["baked", "list"],
     ["lecture", "bsdf"],
     ["lecture", "roulette"],
+    ["nudge", "ulp"],
+    ["nested", "nudge"],
+    ["nested", "ulp"],
 ];
 
 const MATERIALS: [&str; 4] = ["diffuse", "mirror", "dielectric", "reflective"];
 
 /// Effects that must leave no trace in the WGSL where they are not in use, in any case, not even as
 /// a part of a name.
-const WORDS: [&str; 12] = [
+const WORDS: [&str; 15] = [
     "diffuse",
     "mirror",
     "dielectric",
@@ -59,6 +66,9 @@ const WORDS: [&str; 12] = [
     "pole",
     "interior",
     "lecture",
+    "nested",
+    "nudge",
+    "ulp",
 ];
 
 fn possible(set: &Set) -> bool {
@@ -75,6 +85,19 @@ fn completed(names: impl IntoIterator<Item = &'static str>) -> Set {
     }
     if !set.contains("lecture") {
         set.insert("bsdf");
+    }
+    let nudged = set.contains("nudge") || set.contains("ulp");
+    if nudged {
+        set.insert("straddle");
+    } else if set.contains("straddle") {
+        set.extend(["lens", "diffuse"]);
+    }
+    if set.contains("straddle") {
+        set.insert("interior");
+    }
+    if set.contains("nested") {
+        // A ball of another material in glass.
+        set.extend(["dielectric", "diffuse"]);
     }
     if set.contains("priority") {
         set.insert("dielectric");
@@ -131,10 +154,21 @@ fn asking_for(set: &Set) -> (Scene, Settings) {
     {
         sphere(i, 2.0 * i as f64, 1.75, 0.5);
     }
+    if has("nested")
+        && let Some(i) = materials.iter().position(|m| *m == "dielectric")
+    {
+        sphere(0, 2.0 * i as f64, 1.5, 0.49999);
+    }
+    let nudged = has("nudge") || has("ulp");
+    if has("straddle") && !nudged {
+        // Through the lens, with something so small and far that this one gets no pole frame.
+        sphere(0, 0.0, 0.0, 6.0);
+        sphere(0, 900.0, 900.0, 0.01);
+    }
     if has("pole") {
         sphere(0, 0.0, -10001.0, 10000.0);
     }
-    if has("interior") && !has("dielectric") {
+    if has("interior") && !has("dielectric") && !has("straddle") {
         // Around the camera, and too far away for a pole frame.
         sphere(0, 0.0, 0.0, 100.0);
     }
@@ -151,15 +185,24 @@ fn asking_for(set: &Set) -> (Scene, Settings) {
             Integrator::Bsdf
         },
         roulette: has("roulette"),
+        offset: match (has("nudge"), has("ulp")) {
+            (true, _) => Offset::Out(1.0e-4),
+            (_, true) => Offset::Ulp,
+            _ => Offset::Exact,
+        },
         ..Settings::for_scene(&scene)
     };
     (scene, settings)
 }
 
+fn placed(scene: &Scene, settings: &Settings) -> Placement {
+    Placement::with_offset(scene, settings.width, settings.height, settings.offset)
+}
+
 /// Links both stages for a set; what is wrong, if anything is.
 fn fault(set: &Set) -> Option<String> {
     let (scene, settings) = asking_for(set);
-    let placement = Placement::new(&scene, settings.width, settings.height);
+    let placement = placed(&scene, &settings);
     let effects = Effects::derive(&scene, &placement, &settings);
     let derived: Set = effects.names().collect();
     if derived != *set {
@@ -255,18 +298,22 @@ fn all_pairs() {
     check(&sets);
 }
 
-/// All effects that can be in use together, for both geometries and both integrators.
+/// All effects that can be in use together, for both geometries, both integrators, and every way
+/// to leave a surface.
 fn largest() -> Vec<Set> {
     let mut sets = Vec::new();
     for form in ["baked", "list"] {
         for lecture in [false, true] {
-            let other = |name: &&str| match *name {
-                "baked" | "list" => *name == form,
-                "lecture" => lecture,
-                "bsdf" | "roulette" => !lecture,
-                _ => true,
-            };
-            sets.push(ALL.into_iter().filter(other).collect());
+            for exit in ["nested", "nudge", "ulp"] {
+                let other = |name: &&str| match *name {
+                    "baked" | "list" => *name == form,
+                    "lecture" => lecture,
+                    "bsdf" | "roulette" => !lecture,
+                    "nested" | "nudge" | "ulp" => *name == exit,
+                    _ => true,
+                };
+                sets.push(ALL.into_iter().filter(other).collect());
+            }
         }
     }
     sets
@@ -281,11 +328,15 @@ fn all_and_all_but_one() {
             // What needs it goes with it.
             let needed = rest.contains(left_out);
             let rest = if needed && *left_out == "interior" {
-                completed(
-                    all.iter()
-                        .copied()
-                        .filter(|n| !["interior", "dielectric"].contains(n)),
-                )
+                let inside = [
+                    "interior",
+                    "dielectric",
+                    "straddle",
+                    "nested",
+                    "nudge",
+                    "ulp",
+                ];
+                completed(all.iter().copied().filter(|n| !inside.contains(n)))
             } else {
                 rest
             };
@@ -298,15 +349,16 @@ fn all_and_all_but_one() {
 
 #[test]
 fn every_possible_set() {
-    let sets = (0..1 << ALL.len()).map(|bits: u32| {
-        completed(
-            ALL.into_iter()
-                .enumerate()
-                .filter(|(i, _)| bits >> i & 1 == 1)
-                .map(|(_, n)| n),
-        )
-    });
-    let sets: BTreeSet<Set> = sets.filter(possible).collect();
+    let subset = |names: &[&'static str], bits: u32| {
+        let chosen = names.iter().enumerate().filter(|(i, _)| bits >> i & 1 == 1);
+        completed(chosen.map(|(_, n)| *n))
+    };
+    // Of sets with the rare ones, there are too many to link them all in a minute.
+    let rare = ["straddle", "nested", "nudge", "ulp"];
+    let common: Vec<&'static str> = ALL.into_iter().filter(|n| !rare.contains(n)).collect();
+    let every = (0..1 << common.len()).map(|bits| subset(&common, bits));
+    let some = (0..4000u32).map(|i| subset(&ALL, i.wrapping_mul(0x9e37_79b9) >> 13));
+    let sets: BTreeSet<Set> = every.chain(some).filter(possible).collect();
     eprintln!("{} sets", sets.len());
     check(&sets);
 }

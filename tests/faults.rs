@@ -15,6 +15,7 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use cli_support::{Background, Folder, Run, bits, holds};
+use gpu_trace::check::Random;
 use gpu_trace::effects::Effects;
 use gpu_trace::error::Error;
 use gpu_trace::gpu::renderer::GpuRenderer;
@@ -185,7 +186,7 @@ fn a_scene_of_too_many_magnitudes_is_an_error() {
              environment = {{ radiance = [1, 1, 1] }}
              material.a = {{ type = \"diffuse\", albedo = [1, 1, 1] }}
              sphere = [
-                 {{ center = [1, 0, 0], radius = 1, material = \"a\" }},
+                 {{ center = [3, 0, 0], radius = 1, material = \"a\" }},
                  {{ center = [0, 0, 0], radius = {radius}, material = \"a\" }},
              ]"
         )
@@ -203,6 +204,10 @@ fn a_scene_of_too_many_magnitudes_is_an_error() {
             holds(&folder.refused(command), &["error: ", part, "magnitude"]);
         }
     }
+    let dark = scene(near, "0.1").replace("radiance = [1, 1, 1]", "radiance = [0, 1e-320, 0]");
+    folder.write("bad.toml", dark);
+    let text = folder.refused(&["bad.toml", "-o", "r.npy"]);
+    holds(&text, &["error: the brightest light", "too dark"]);
     // What f32 holds is rendered.
     for (camera, radius) in [(near, "1e-37"), (far, "1e-10"), (near, "1")] {
         folder.write("good.toml", scene(camera, radius));
@@ -466,7 +471,7 @@ fn a_hangup_that_comes_twice_waits_and_one_that_is_ignored_does_nothing() {
 /// A picture that does not compress.
 fn noise(name: &str) -> Picture {
     let (width, height) = (600, 400);
-    let mut random = common::Random::new(name);
+    let mut random = Random::new(name);
     let pixels = (0..width * height).map(|_| {
         let [r, g, b, _] = random.unit4();
         [r, g, b]
@@ -538,7 +543,7 @@ fn kill_writers(
     let versions = FORMATS.map(|(name, _)| {
         ["0", "1"].map(|version| folder.read(&format!("versions/{version}{name}")))
     });
-    let mut random = common::Random::new(test);
+    let mut random = Random::new(test);
     let mut killed = Killed::default();
     for kill in 0.. {
         // One that never is enough fails below.
@@ -620,7 +625,7 @@ fn a_killed_render_leaves_whole_files() {
         folder.ok(&format!("{arguments} --seed {seed}"));
         folder.npy("r.npy")
     });
-    let mut random = common::Random::new("kill");
+    let mut random = Random::new("kill");
     let mut left = 0;
     for seed in [0, 1, 0, 1, 0, 1] {
         let mut run = Background::start(&folder, &format!("{arguments} --seed {seed}"));

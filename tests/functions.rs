@@ -4,8 +4,9 @@
 
 mod common;
 
-use common::{Agreement, Random, Row, ULP, probe, to_row, vector};
+use common::{Agreement, Row, ULP, probe, to_row, vector};
 use glam::{DVec2, DVec3};
+use gpu_trace::check::Random;
 use gpu_trace::reference::core::sampling::{
     basis_around, cap_direction, circle_point, cosine_direction, sphere_direction,
 };

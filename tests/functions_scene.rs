@@ -3,8 +3,10 @@
 
 mod common;
 
-use common::{Agreement, EMPTY, Random, Row, ULP, probe, probe_of, scene, to_row, vector};
+use common::{Agreement, EMPTY, Row, ULP, probe, probe_of, scene, to_row, vector};
 use glam::DVec3;
+use gpu_trace::check::Random;
+use gpu_trace::media::Medium;
 use gpu_trace::placement::{PlacedSphere, Placement, Side};
 use gpu_trace::reference::scene::camera::camera_ray;
 use gpu_trace::reference::scene::priority::{cross_surface, relative_index};
@@ -82,30 +84,26 @@ fn the_side_decides_the_root() {
     let (outside, inside) = ([1.0f32, 2.0, 1.0, 3.0], [1.0f32, 1.0, 4.0, -3.0]);
     let bits = |q: [f32; 4]| q.map(f32::to_bits);
     let none = 3.0e38;
-    // Coefficients; side, own, inward; t, inside.
+    // Coefficients; inside, own; t. What is known of the side decides, not the sign of c.
     let cases = [
-        (outside, [0, 0, 0], 1.0, 0.0),
-        (outside, [0, 1, 0], none, 0.0),
-        (inside, [1, 0, 0], 3.0, 1.0),
+        (outside, [0, 0], 1.0),
+        (outside, [0, 1], none),
+        (inside, [1, 0], 3.0),
         // From its own surface: the chord 2 b/a.
-        (outside, [1, 1, 0], 4.0, 1.0),
-        // A sphere with two sides: the sign of c, or on its own surface what the path knows.
-        (outside, [2, 0, 0], 1.0, 0.0),
-        (outside, [2, 0, 1], 1.0, 0.0),
-        (inside, [2, 0, 0], 3.0, 1.0),
-        (outside, [2, 1, 0], none, 0.0),
-        (outside, [2, 1, 1], 4.0, 1.0),
-        (inside, [2, 1, 0], none, 0.0),
+        (outside, [1, 1], 4.0),
+        // c = 3 at a path that is inside, c = -3 at one that is outside: rounding, taken as 0.
+        ([1.0, -2.0, 1.0, 3.0], [1, 0], 0.0),
+        (inside, [0, 0], 0.0),
+        (inside, [0, 1], none),
     ];
     let inputs: Vec<[[u32; 4]; 2]> = cases
         .iter()
-        .map(|(q, [side, own, inward], ..)| [bits(*q), [*side, *own, *inward, 0]])
+        .map(|(q, [inside, own], _)| [bits(*q), [*inside, *own, 0, 0]])
         .collect();
     let outputs: Vec<Row> = probe(&["interior"])
         .call("root_from", &inputs)
         .expect("the probe runs");
     for (case, output) in cases.iter().zip(&outputs) {
-        assert_eq!(output[1], case.3, "{case:?}");
         assert!(
             (output[0] - case.2).abs() <= 8.0 * f32::EPSILON * case.2,
             "{case:?}: {}",
@@ -213,8 +211,10 @@ fn placed(anchor: Row, radius: f64, pole: Option<DVec3>) -> PlacedSphere {
         anchor: vector(anchor),
         radius,
         pole,
-        side: Side::Either,
+        side: Side::Tracked,
         level: 0,
+        container: None,
+        core: None,
     }
 }
 
@@ -269,6 +269,7 @@ fn vertex_at_agrees() {
                 direction: vector(d),
                 own: None,
                 inward: false,
+                media: Vec::new(),
             };
             let sphere = placed(anchor, *radius, pole.map(vector));
             let twin = vertex_at(
@@ -328,26 +329,35 @@ fn nested_media_agree() {
             ]
         })
         .collect();
-    let outputs: Vec<[[u32; 4]; 3]> = probe
+    let outputs: Vec<[[u32; 4]; 4]> = probe
         .call("relative_index", &inputs)
         .expect("the probe runs");
-    for ((set, level, inside), [eta, after, levels]) in cases.into_iter().zip(outputs) {
+    for ((set, level, inside), [eta, after, levels, spheres]) in cases.into_iter().zip(outputs) {
         let own = f64::from(ior[level as usize]);
-        let index = |l: u32| (l, f64::from(ior[l as usize]));
-        let mut media: Vec<(u32, f64)> = (0..4).filter(|l| set >> l & 1 == 1).map(index).collect();
+        let medium = |level: u32| Medium {
+            level,
+            ior: f64::from(ior[level as usize]),
+            sphere: 7,
+        };
+        let mut media: Vec<Medium> = (0..4).filter(|l| set >> l & 1 == 1).map(medium).collect();
         let twin = relative_index(&media, level, own, inside);
         let eta = f64::from(f32::from_bits(eta[0]));
         assert!(
             (eta / twin - 1.0).abs() <= 2.5 * ULP,
             "{set:04b} {level}: {eta} for {twin}"
         );
-        cross_surface(&mut media, level, own, inside);
-        let expected: u32 = media.iter().map(|(l, _)| 1 << l).sum();
+        cross_surface(&mut media, medium(level), inside);
+        let expected: u32 = media.iter().map(|m| 1 << m.level).sum();
         assert_eq!(after[0], expected, "{set:04b} {level}");
-        for (l, n) in media {
+        assert_eq!(
+            spheres[level as usize],
+            if inside { u32::MAX } else { 7 },
+            "{set:04b} {level}"
+        );
+        for m in media {
             assert_eq!(
-                f64::from(f32::from_bits(levels[l as usize])),
-                n,
+                f64::from(f32::from_bits(levels[m.level as usize])),
+                m.ior,
                 "{set:04b} {level}"
             );
         }
@@ -395,6 +405,7 @@ fn camera_rays_agree() {
                     &camera,
                     [pixel[0], pixel[1]],
                     [u[0] + shift, u[1], u[2], u[3]],
+                    &Vec::new(),
                 );
                 let place = || format!("pixel {pixel:?}, u = {u:?}: {start:?}, {d:?} for {twin:?}");
                 assert_eq!(vector(*anchor), twin.anchor);

@@ -116,7 +116,7 @@ fn roulette_does_not_change_the_mean() {
     let film = render_gpu(&scene, &settings(&scene, 32, 32, 256));
     let (expected, _) = furnace(0.5, 64);
     let z = |expected: f64| {
-        let (mean, error) = common::statistics::mean_and_error(&red(&film));
+        let (mean, error) = gpu_trace::statistics::mean_and_error(&red(&film));
         (mean - expected) / error
     };
     assert!(z(expected).abs() < 3.9, "{} deviations", z(expected));
@@ -139,7 +139,7 @@ fn the_lectures_estimator_has_the_same_mean() {
         ..settings(&scene, 32, 32, 1024)
     };
     let film = render_gpu(&scene, &settings);
-    let (mean, error) = common::statistics::mean_and_error(&red(&film));
+    let (mean, error) = gpu_trace::statistics::mean_and_error(&red(&film));
     let z = (mean - 2.0) / error;
     assert!(z.abs() < 3.9, "{mean} +- {error}");
     // numerics.md, case 39: Var = (1 + 2 rho m)/(1 - q2) - m^2, m = 2, q2 = 4 rho^2/(3 (1 - p)).

@@ -29,7 +29,7 @@ const FURNACE: &str = "
 
 /// Many spheres in a cube under a sky.
 fn cloud(count: u32) -> String {
-    let mut random = common::Random::new("cloud");
+    let mut random = gpu_trace::check::Random::new("cloud");
     let mut text = String::from(
         "
         [camera]

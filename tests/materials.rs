@@ -4,8 +4,9 @@
 mod common;
 
 use bytemuck::{Pod, Zeroable};
-use common::{Agreement, Random, Row, ULP, probe, to_row, vector};
+use common::{Agreement, Row, ULP, probe, to_row, vector};
 use glam::DVec3;
+use gpu_trace::check::Random;
 use gpu_trace::reference::bsdf::dielectric::{fresnel, sample_dielectric};
 use gpu_trace::reference::bsdf::diffuse::{sample_diffuse, sample_diffuse_uniform};
 use gpu_trace::reference::bsdf::mirror::sample_mirror;

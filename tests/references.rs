@@ -73,7 +73,7 @@ fn compare(name: &str, film: &Film) -> Verdict {
     let tests = film.rect().pixels() * 3;
     Verdict {
         worst_pixel,
-        limit: common::statistics::normal_limit(tests),
+        limit: gpu_trace::statistics::normal_limit(tests),
         pooled: (0..3).map(z).fold(0.0, f64::max),
         bias: (0..3).map(bias).fold(0.0, f64::max),
     }

@@ -5,14 +5,15 @@ mod common;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use bytemuck::{Pod, Zeroable};
-use common::statistics::{mean_and_error, normal_p, sidak};
-use common::{Agreement, Random, Row, ULP, probe, to_row, vector};
+use common::{Agreement, Row, ULP, probe, to_row, vector};
 use glam::{DVec2, DVec3};
+use gpu_trace::check::Random;
 use gpu_trace::reference::bsdf::reflective::{
     Reflective, eval_reflective, in_lobe, lobe_probability, sample_reflective,
     sample_reflective_uniform,
 };
 use gpu_trace::reference::core::sampling::sphere_direction;
+use gpu_trace::statistics::{mean_and_error, normal_p, sidak};
 
 const CASES: usize = 100_000;
 

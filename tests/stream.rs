@@ -2,10 +2,11 @@
 
 mod common;
 
-use common::statistics::{SIGNIFICANCE, correlation, sidak, uniform_ks};
-use common::{Random, probe};
+use common::probe;
+use gpu_trace::check::Random;
 use gpu_trace::reference::core::random::{mix_bits, sample_key, unit_float};
 use gpu_trace::settings::stream_words;
+use gpu_trace::statistics::{SIGNIFICANCE, correlation, sidak, uniform_ks};
 
 /// Where, and which: the two rows of the probe's `random4`.
 type Key = [[u32; 4]; 2];

@@ -13,7 +13,7 @@ use crate::error::{Error, Result};
 use crate::output::ProgressMode;
 use crate::scene::{MAX_BOUNCES, Scene};
 use crate::settings::{
-    DEFAULT_TERMINATION, GeometryChoice, Integrator, MAXIMUM_SPP, Rect, Settings,
+    DEFAULT_TERMINATION, GeometryChoice, Integrator, MAXIMUM_SPP, Offset, Rect, Settings,
 };
 
 /// The options of `render`.
@@ -183,6 +183,16 @@ pub struct RenderArgs {
 
     #[arg(
         long,
+        value_name = "MODE",
+        default_value = "exact",
+        hide_default_value = true,
+        help_heading = "Light transport",
+        help = "How paths leave a surface: exact, or for comparison none, back:X, out:X (a nudge by X), ulp [default: exact]"
+    )]
+    pub offset: Offset,
+
+    #[arg(
+        long,
         value_name = "NAME",
         value_enum,
         default_value = "auto",
@@ -331,6 +341,7 @@ impl RenderArgs {
                 scene.spheres.len()
             )));
         }
+        settings.offset = self.offset;
         settings.error = self.error;
         settings.time = self.time;
         if self.backend == BackendArg::Cpu && self.device.is_some() {
@@ -340,4 +351,35 @@ impl RenderArgs {
         }
         Ok(settings)
     }
+}
+
+/// The options of `check`.
+#[derive(Clone, Debug, Args)]
+pub(super) struct CheckArgs {
+    /// Only this case, by number or part of its name; may be repeated.
+    #[arg(long, value_name = "NAME")]
+    pub(super) case: Vec<String>,
+    /// Fewer trials: under a minute without a GPU.
+    #[arg(long)]
+    pub(super) quick: bool,
+    /// Print JSON.
+    #[arg(long)]
+    pub(super) json: bool,
+    /// Say what each case sets up, and where its worst error is.
+    #[arg(short, long)]
+    pub(super) verbose: bool,
+    /// How paths leave a surface: exact, or to see what fails then none, back:X, out:X, ulp.
+    #[arg(
+        long,
+        value_name = "MODE",
+        default_value = "exact",
+        hide_default_value = true
+    )]
+    pub(super) offset: Offset,
+    /// Which adapter, as `gpu-trace devices` lists them.
+    #[arg(long, value_name = "INDEX|NAME")]
+    pub(super) device: Option<String>,
+    /// Give every case a slightly wrong truth: all must fail (a check of the check).
+    #[arg(long)]
+    pub(super) disturb: bool,
 }

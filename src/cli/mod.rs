@@ -1,6 +1,7 @@
 //! What was typed. One file a subcommand; each turns its options into what the stages take.
 
 mod args;
+mod check;
 mod devices;
 mod effects;
 mod fault;
@@ -31,9 +32,10 @@ Examples:
   gpu-trace glass --spp 1024 -o glass.exr      another scene, linear floats
   gpu-trace my.toml --error 1% --time 2m       until the error is 1 % or two minutes are over
   gpu-trace effects my.toml                    what the kernel will hold, and why
+  gpu-trace check --quick                      does this adapter stand the hard cases?
 
-Exit codes: 0 done; 1 failed; 2 wrong usage or a bad scene; 129, 130 or 143 ended by a signal, with
-what there was written.";
+Exit codes: 0 done; 1 failed; 2 wrong usage or a bad scene; 3 a check failed; 129, 130 or 143 ended
+by a signal, with what there was written.";
 
 /// Path-traces scenes made of spheres on a GPU, without a display.
 ///
@@ -66,6 +68,8 @@ enum Command {
         #[arg(long)]
         json: bool,
     },
+    /// Measure the hard numerical cases on this adapter against f64; exit 3 if any fails.
+    Check(Box<args::CheckArgs>),
     /// List the adapters, with driver and limits.
     Devices {
         /// Print JSON.
@@ -147,6 +151,7 @@ fn run(cli: Cli) -> Result<()> {
         }
         Some(Command::Render(args)) => render::run(&args),
         Some(Command::Effects { render, json }) => effects::run(&render, json),
+        Some(Command::Check(args)) => check::run(&args),
         Some(Command::Devices { json }) => devices::run(json),
         Some(Command::Scene(SceneCommand::Check { scene })) => scene::check(&scene),
         Some(Command::Scene(SceneCommand::Schema)) => scene::schema(),
@@ -178,7 +183,7 @@ fn misplaced_word(error: &clap::Error) -> Option<String> {
 
 /// Placement and effects of `scene`: what every command that needs a kernel starts from.
 fn derive(scene: &Scene, settings: &Settings) -> Result<(Placement, Effects)> {
-    let placement = Placement::new(scene, settings.width, settings.height);
+    let placement = Placement::with_offset(scene, settings.width, settings.height, settings.offset);
     if placement.media.levels > MAX_LEVELS {
         return Err(Error::Scene(format!(
             "more than {MAX_LEVELS} dielectrics lie in or across each other: the scene needs {} \
@@ -209,6 +214,11 @@ fn check_magnitudes(placement: &Placement) -> Result<()> {
         if !sphere.anchor.as_vec3().is_finite() {
             return refuse(&format!("the center of sphere {}", sphere.source + 1));
         }
+    }
+    if !placement.light.is_finite() {
+        return Err(Error::Scene(
+            "the brightest light of the scene is too dark to compute with".into(),
+        ));
     }
     let camera = &placement.camera;
     if !(camera.approach as f32).is_finite() {

@@ -170,14 +170,14 @@ enum Member<'a> {
 }
 
 impl MaterialRecord {
-    /// The record of `material`.
+    /// The record of `material`, emission times `light`.
     #[must_use]
-    pub fn new(material: &Material) -> Self {
+    pub fn new(material: &Material, light: f64) -> Self {
         let vector = |v: DVec3| v.as_vec3().to_array();
         let mut record = Self {
             color: [0.0; 3],
             kind: 0,
-            emission: vector(material.emission),
+            emission: vector(material.emission * light),
             specular: [0.0; 3],
             epsilon: 1.0,
             mu: 0.0,

@@ -61,6 +61,8 @@ pub struct GpuRenderer {
     work: wgpu::Buffer,
     counters: wgpu::Buffer,
     region: RegionTargets,
+    /// Kernel radiance per radiance.
+    light: f64,
     /// Paths a second, from the last dispatch.
     rate: f64,
     limits: DispatchLimits,
@@ -198,6 +200,7 @@ impl GpuRenderer {
             work,
             counters,
             region,
+            light: placement.light,
             rate: 1.0e6,
             limits: DispatchLimits::default(),
             step_limit,
@@ -402,8 +405,9 @@ impl GpuRenderer {
                 for x in 0..region.width as usize {
                     let pixel = &mut pixels[(y * region.width) as usize + x];
                     for c in 0..3 {
-                        pixel.sum[c] = f64::from(high[x][c]) + f64::from(low[x][c]);
-                        pixel.m2[c] = f64::from(deviation[x][c]);
+                        let sum = f64::from(high[x][c]) + f64::from(low[x][c]);
+                        pixel.sum[c] = sum / self.light;
+                        pixel.m2[c] = f64::from(deviation[x][c]) / (self.light * self.light);
                     }
                     tally.rays += high[x][3] as u64;
                     tally.cut_throughput += f64::from(low[x][3]);

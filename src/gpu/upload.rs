@@ -39,13 +39,19 @@ impl Uploads {
             if effects.has("priority") {
                 attributes.push(sphere.level);
             }
+            if effects.has("nested") {
+                for other in [sphere.container, sphere.core] {
+                    attributes.push(other.map_or(u32::MAX, |i| i as u32));
+                }
+            }
         }
         all.push((0, "spheres", bytemuck::cast_slice(&spheres).to_vec()));
         all.push((1, "poles", bytemuck::cast_slice(&poles).to_vec()));
         all.push((2, "attributes", bytemuck::cast_slice(&attributes).to_vec()));
         if let Some((members, size)) = kernel.struct_members("Material") {
             let materials = scene.materials.iter();
-            let bytes = materials.flat_map(|m| MaterialRecord::new(m).bytes(&members, size));
+            let record = |m| MaterialRecord::new(m, placement.light);
+            let bytes = materials.flat_map(|m| record(m).bytes(&members, size));
             all.push((3, "materials", bytes.collect()));
         }
         // A binding of size zero is not allowed; what it holds is never read.

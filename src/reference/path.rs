@@ -10,10 +10,11 @@ use super::core::random::{random4, sample_key};
 use super::light::environment_radiance;
 use super::scene::camera::camera_ray;
 use super::scene::priority::{cross_surface, relative_index};
-use super::scene::ray::{Ray, vertex_at};
+use super::scene::ray::{leave, vertex_at};
 use super::scene::sphere::closest_hit;
 use crate::error::{Error, Result};
 use crate::film::{BLOCK, NonFinite, PixelSums, Tally, Window};
+use crate::media::Medium;
 use crate::placement::Placement;
 use crate::render::{Control, Renderer};
 use crate::scene::{MaterialKind, Scene};
@@ -62,11 +63,10 @@ impl PathTracer<'_> {
         let key = sample_key(stream, pixel, sample as u32);
         let random = |dimension| random4(key, dimension);
         let lecture = matches!(settings.integrator, Integrator::Lecture { .. });
-        let mut ray = camera_ray(&placement.camera, pixel, random(0));
+        let mut ray = camera_ray(&placement.camera, pixel, random(0), &placement.within);
         let mut result = PathResult::default();
         let mut throughput = DVec3::ONE;
         let mut compression = 1.0;
-        let mut media = placement.media.camera.clone();
         loop {
             result.rays += 1;
             let Some(hit) = closest_hit(&ray, &placement.spheres) else {
@@ -83,7 +83,7 @@ impl PathTracer<'_> {
             let u = random(result.bounces + 1);
             let vertex = vertex_at(&ray, &hit, sphere);
             let (level, ior) = (sphere.level, ior_of(&material.kind));
-            let eta = relative_index(&media, level, ior, hit.inside);
+            let eta = relative_index(&ray.media, level, ior, hit.inside);
             let s = scatter(
                 &material.kind,
                 vertex.normal,
@@ -92,9 +92,6 @@ impl PathTracer<'_> {
                 u,
                 lecture,
             );
-            if s.crossed {
-                cross_surface(&mut media, level, ior, hit.inside);
-            }
             throughput *= s.weight;
             compression *= s.compression;
             let largest = (throughput * compression).max_element();
@@ -107,13 +104,15 @@ impl PathTracer<'_> {
                 return result;
             }
             throughput /= survival;
-            ray = Ray {
-                anchor: vertex.anchor,
-                offset: vertex.offset,
-                direction: s.direction,
-                own: Some(hit.index),
-                inward: hit.inside != s.crossed,
-            };
+            ray = leave(ray, &hit, &vertex, &s, placement.offset);
+            if s.crossed {
+                let medium = Medium {
+                    level,
+                    ior,
+                    sphere: hit.index,
+                };
+                cross_surface(&mut ray.media, medium, hit.inside);
+            }
             result.bounces += 1;
         }
     }

@@ -22,7 +22,7 @@ pub(super) fn vector(v: DVec3) -> String {
 
 pub(super) fn geometry(scene: &Scene, placement: &Placement, effects: &Effects) -> String {
     let mut text = String::from(
-        "import package::scene::ray::{Ray, Hit, Root, Frame, NO_HIT, NO_SPHERE};\n\
+        "import package::scene::ray::{Ray, Hit, Frame, NO_HIT, NO_SPHERE};\n\
          import package::scene::material::Material;\n",
     );
     let centered = placement.spheres.iter().any(|s| s.pole.is_none());
@@ -32,11 +32,16 @@ pub(super) fn geometry(scene: &Scene, placement: &Placement, effects: &Effects) 
     if effects.has("pole") && placement.poles > 0 {
         text += "import package::scene::sphere::pole_quadratic;\n";
     }
-    if placement.spheres.iter().any(|s| s.side == Side::Outside) {
-        text += "import package::scene::sphere::root_outside;\n";
-    }
-    if placement.spheres.iter().any(|s| s.side != Side::Outside) {
-        text += "import package::scene::sphere::root_from;\n";
+    let any = |sides: &[Side]| placement.spheres.iter().any(|s| sides.contains(&s.side));
+    for (used, name) in [
+        (any(&[Side::Outside]), "sphere::root_outside"),
+        (any(&[Side::Inside]), "sphere::root_interior"),
+        (any(&[Side::Tracked, Side::Sign]), "sphere::root_from"),
+        (any(&[Side::Tracked]), "ray::is_within"),
+    ] {
+        if used {
+            text += &format!("import package::scene::{name};\n");
+        }
     }
     closest_hit(&mut text, placement, effects);
     frame_of(&mut text, placement, effects);
@@ -61,33 +66,62 @@ fn closest_hit(text: &mut String, placement: &Placement, effects: &Effects) {
                 number(sphere.radius)
             ),
         };
-        let root = if sphere.side == Side::Outside {
-            format!("let t = root_outside(q.b, q.square, q.c, ray.own == {i}u);")
-        } else {
-            format!(
-                "let root = root_from({}u, q.a, q.b, q.square, q.c, ray.own == {i}u, ray.inward);\n\
-                 let t = root.t;",
-                sphere.side as u32
-            )
+        let inside = match sphere.side {
+            Side::Outside => "false".to_owned(),
+            Side::Inside => "true".to_owned(),
+            Side::Tracked => within(placement, effects, i),
+            Side::Sign => "select(q.c < 0.0, ray.inward, own)".to_owned(),
         };
+        let root = match sphere.side {
+            Side::Outside => "root_outside(q.b, q.square, q.c, own)",
+            Side::Inside => "root_interior(q.a, q.b, q.square, q.c, own)",
+            Side::Tracked | Side::Sign => "root_from(inside, q, own)",
+        };
+        let known = if interior {
+            format!("let inside = {inside};\n")
+        } else {
+            String::new()
+        };
+        let reach = nested_reach(placement, effects, sphere);
+        let closer = reach
+            .as_ref()
+            .map_or("t < hit.t", |_| "t < hit.t && nested_reach");
+        let reach = reach.map_or_else(String::new, |r| format!("let nested_reach = {r};\n"));
         let _ = write!(
             text,
-            "{{\nlet x = (ray.anchor - {}) + ray.offset;\nlet q = {quadratic};\n{root}\n\
-             let closer = t < hit.t;\nhit.t = select(hit.t, t, closer);\n\
+            "{{\nlet x = (ray.anchor - {}) + ray.offset;\nlet q = {quadratic};\n\
+             let own = ray.own == {i}u;\n{known}let t = {root};\n{reach}\
+             let closer = {closer};\nhit.t = select(hit.t, t, closer);\n\
              hit.index = select(hit.index, {i}u, closer);\n",
             vector(sphere.anchor),
         );
         if interior {
-            let inside = if sphere.side == Side::Outside {
-                "false"
-            } else {
-                "root.inside"
-            };
-            let _ = writeln!(text, "hit.inside = select(hit.inside, {inside}, closer);");
+            *text += "hit.inside = select(hit.inside, inside, closer);\n";
         }
         *text += "}\n";
     }
     *text += "return hit;\n}\n";
+}
+
+/// Whether the ray runs inside the dielectric `index`.
+fn within(placement: &Placement, effects: &Effects, index: usize) -> String {
+    if effects.has("priority") {
+        let level = placement.spheres[index].level;
+        format!("is_within(ray, {index}u, {level}u)")
+    } else {
+        format!("is_within(ray, {index}u)")
+    }
+}
+
+/// When a sphere can be hit that lies just within another, or has one just within it; see
+/// `nested_reach` in `shaders/scene/list.wesl`.
+fn nested_reach(placement: &Placement, effects: &Effects, sphere: &PlacedSphere) -> Option<String> {
+    let container = sphere.container.map(|c| within(placement, effects, c));
+    let core = sphere
+        .core
+        .map(|c| format!("!{}", within(placement, effects, c)));
+    let conditions: Vec<String> = container.into_iter().chain(core).collect();
+    (effects.has("nested") && !conditions.is_empty()).then(|| conditions.join(" && "))
 }
 
 /// Writes `target`, whose value depends on the sphere, as a chain of selections. The most common
@@ -141,7 +175,7 @@ fn material_of(text: &mut String, scene: &Scene, placement: &Placement, effects:
     let records: Vec<MaterialRecord> = placement
         .spheres
         .iter()
-        .map(|s| MaterialRecord::new(&scene.materials[s.material]))
+        .map(|s| MaterialRecord::new(&scene.materials[s.material], placement.light))
         .collect();
     *text += "fn material_of(index: u32) -> Material {\nvar material: Material;\n";
     for name in MaterialRecord::members(effects) {

@@ -9,6 +9,7 @@ use wesl::{ManglerKind, ModulePath, VirtualResolver, Wesl};
 
 use crate::effects::Effects;
 use crate::error::{Error, Result};
+use crate::media::Medium;
 use crate::placement::Placement;
 use crate::scene::Scene;
 
@@ -171,23 +172,46 @@ fn config(scene: &Scene, placement: &Placement, effects: &Effects) -> String {
         ray_steps(placement, effects)
     );
     if effects.has("environment") {
-        let radiance = scene.environment.unwrap_or_default();
+        let radiance = scene.environment.unwrap_or_default() * placement.light;
         text += &format!("const ENVIRONMENT: vec3f = {};\n", baked::vector(radiance));
     }
-    if effects.has("priority") {
-        let levels = placement.media.levels.max(1);
-        let camera = &placement.media.camera;
-        let inside: u32 = camera.iter().map(|(level, _)| 1 << level).sum();
-        let ior = (0..levels).map(|level| {
-            let known = camera.iter().find(|(l, _)| *l == level);
-            baked::number(known.map_or(1.0, |(_, ior)| *ior))
-        });
-        let ior: Vec<String> = ior.collect();
+    if effects.has("nudge") {
+        let [back, out] = placement.offset.distances().unwrap_or_default();
         text += &format!(
-            "const LEVELS: u32 = {levels}u;\nconst INITIAL_MEDIA: u32 = {inside}u;\n\
-             const INITIAL_IOR = array<f32, {levels}>({});\n",
-            ior.join(", ")
+            "const NUDGE_BACK: f32 = {};\nconst NUDGE_OUT: f32 = {};\n",
+            baked::number(back),
+            baked::number(out)
         );
     }
+    text += &initial_media(placement, effects);
     text
+}
+
+/// What the camera is in.
+fn initial_media(placement: &Placement, effects: &Effects) -> String {
+    let camera = &placement.within;
+    let sphere = |medium: Option<&Medium>| {
+        let index = medium.map_or(u32::MAX, |m| m.sphere as u32);
+        format!("{index}u")
+    };
+    if !effects.has("priority") {
+        return if effects.has("dielectric") {
+            format!("const INITIAL_WITHIN: u32 = {};\n", sphere(camera.first()))
+        } else {
+            String::new()
+        };
+    }
+    let levels = placement.media.levels.max(1);
+    let inside: u32 = camera.iter().map(|medium| 1 << medium.level).sum();
+    let each = |value: &dyn Fn(Option<&Medium>) -> String| -> String {
+        let values = (0..levels).map(|level| value(camera.iter().find(|m| m.level == level)));
+        values.collect::<Vec<_>>().join(", ")
+    };
+    format!(
+        "const LEVELS: u32 = {levels}u;\nconst INITIAL_MEDIA: u32 = {inside}u;\n\
+         const INITIAL_IOR = array<f32, {levels}>({});\n\
+         const INITIAL_SPHERES = array<u32, {levels}>({});\n",
+        each(&|medium| baked::number(medium.map_or(1.0, |m| m.ior))),
+        each(&sphere)
+    )
 }

@@ -1,8 +1,6 @@
 //! What the GPU tests share: a device, kernels for any set of effects, and statistics.
 #![expect(dead_code, reason = "each test binary uses a part of it")]
 
-pub(crate) mod statistics;
-
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
@@ -93,7 +91,7 @@ pub(crate) fn settings(scene: &Scene, width: u32, height: u32, spp: u64) -> Sett
 
 /// A renderer on the GPU.
 pub(crate) fn gpu_renderer(scene: &Scene, settings: &Settings) -> GpuRenderer {
-    let placement = Placement::new(scene, settings.width, settings.height);
+    let placement = Placement::with_offset(scene, settings.width, settings.height, settings.offset);
     let effects = Effects::derive(scene, &placement, settings);
     GpuRenderer::new(gpu(), scene, &placement, &effects, settings).unwrap_or_else(|e| panic!("{e}"))
 }
@@ -108,7 +106,7 @@ pub(crate) fn render_gpu(scene: &Scene, settings: &Settings) -> Film {
 
 /// Renders with the CPU reference.
 pub(crate) fn render_cpu(scene: &Scene, settings: &Settings) -> Film {
-    let placement = Placement::new(scene, settings.width, settings.height);
+    let placement = Placement::with_offset(scene, settings.width, settings.height, settings.offset);
     let mut renderer =
         ReferenceRenderer::new(scene, &placement, settings, 0).unwrap_or_else(|e| panic!("{e}"));
     render_quietly(&mut renderer, settings)
@@ -146,7 +144,7 @@ pub(crate) const EMPTY: &str = "
 /// A probe of the functions that exactly `effects` bring, with the camera of `scene`.
 pub(crate) fn probe_of(scene: &Scene, effects: &[&str]) -> Probe {
     let settings = Settings::for_scene(scene);
-    let placement = Placement::new(scene, settings.width, settings.height);
+    let placement = Placement::with_offset(scene, settings.width, settings.height, settings.offset);
     let effects = Effects::of(scene, &placement, &settings, effects);
     Probe::new(&gpu(), scene, &placement, &effects).unwrap_or_else(|e| panic!("{e}"))
 }
@@ -154,53 +152,6 @@ pub(crate) fn probe_of(scene: &Scene, effects: &[&str]) -> Probe {
 /// A probe of the functions that exactly `effects` bring.
 pub(crate) fn probe(effects: &[&str]) -> Probe {
     probe_of(&scene(EMPTY), effects)
-}
-
-/// A deterministic source of test inputs, by the sample stream itself.
-#[derive(Debug)]
-pub(crate) struct Random {
-    key: [u32; 4],
-}
-
-impl Random {
-    /// A stream of its own for each `name`.
-    pub(crate) fn new(name: &str) -> Self {
-        // FNV-1a.
-        let hash = name.bytes().fold(0x811c_9dc5, |h: u32, b| {
-            (h ^ u32::from(b)).wrapping_mul(0x0100_0193)
-        });
-        Self {
-            key: [hash, 0, 0, 0],
-        }
-    }
-
-    /// Four random words.
-    pub(crate) fn words(&mut self) -> [u32; 4] {
-        self.key[1] += 1;
-        gpu_trace::reference::core::random::random_words([self.key[0], !self.key[0]], self.key[1])
-    }
-
-    /// Four uniform numbers in [0, 1) with 24 bits, as the kernel has them.
-    pub(crate) fn unit4(&mut self) -> Row {
-        gpu_trace::reference::core::random::unit_float(self.words()).map(|x| x as f32)
-    }
-
-    /// A uniform number in [0, 1).
-    pub(crate) fn unit(&mut self) -> f64 {
-        f64::from(self.unit4()[0])
-    }
-
-    /// A uniform number in [low, high).
-    pub(crate) fn range(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.unit()
-    }
-
-    /// A uniform direction.
-    pub(crate) fn direction(&mut self) -> glam::DVec3 {
-        let u = self.unit4();
-        let u = glam::DVec2::new(f64::from(u[0]), f64::from(u[1]));
-        gpu_trace::reference::core::sampling::sphere_direction(u)
-    }
 }
 
 /// A vector of a row's first three numbers.

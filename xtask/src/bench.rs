@@ -1,15 +1,16 @@
 //! `cargo xtask bench`: the benchmarks, as ratios of things that run side by side.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 
-use crate::{cargo, run};
+use crate::{cargo, program, run};
 
 const USAGE: &str = "\
 Usage: cargo xtask bench [TABLE...]
 
   naive      the kernel against a plain one
   unused     effects that a scene does not use
+  offsets    ways to leave a surface: what each gets wrong, and costs
   geometry   spheres as constants or in a buffer
   resources  time to the first window, peak memory
   peers      Mitsuba 3 on the same scene (installs it into target/peers with pip;
@@ -20,7 +21,14 @@ Without a name: all but peers. Run it on an idle machine.
 
 /// Runs the benchmarks named in `tables`.
 pub(crate) fn all(tables: &[String]) -> Result<(), String> {
-    const KNOWN: [&str; 5] = ["naive", "unused", "geometry", "resources", "peers"];
+    const KNOWN: [&str; 6] = [
+        "naive",
+        "unused",
+        "geometry",
+        "offsets",
+        "resources",
+        "peers",
+    ];
     if tables.iter().any(|t| t == "--help" || t == "-h") {
         print!("{USAGE}");
         return Ok(());
@@ -30,7 +38,7 @@ pub(crate) fn all(tables: &[String]) -> Result<(), String> {
     }
     let chosen = |name: &str| tables.is_empty() || tables.iter().any(|t| t == name);
     run(cargo().args(["build", "--release"]))?;
-    let in_process: Vec<&str> = KNOWN[..3]
+    let in_process: Vec<&str> = KNOWN[..4]
         .iter()
         .copied()
         .filter(|name| chosen(name))
@@ -50,20 +58,13 @@ pub(crate) fn all(tables: &[String]) -> Result<(), String> {
     Ok(())
 }
 
-/// The program, as cargo has built it.
-pub(crate) fn program() -> PathBuf {
-    let target =
-        std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| "target".into(), PathBuf::from);
-    target.join("release/gpu-trace")
-}
-
 /// Time from launch to an image of the first window (16 samples), and peak memory of a render.
 fn resources() -> Result<(), String> {
     let folder = std::env::temp_dir().join(format!("gpu-trace-bench-{}", std::process::id()));
     std::fs::create_dir_all(&folder).map_err(|e| e.to_string())?;
     let image = folder.join("image.exr");
     let render = |spp: &str| {
-        let mut command = Command::new(program());
+        let mut command = Command::new(program("release"));
         command
             .args(["lecture", "--quiet", "--spp", spp, "-o"])
             .arg(&image);
@@ -126,6 +127,6 @@ fn peers() -> Result<(), String> {
     ]))?;
     run(Command::new(&python)
         .arg("benches/peers/side_by_side.py")
-        .arg(program())
+        .arg(program("release"))
         .env("NODEVICE_SELECT", "1"))
 }

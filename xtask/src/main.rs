@@ -1,15 +1,18 @@
 //! Tasks of the project: `cargo xtask test`, `cargo xtask bench`, `cargo xtask soak`.
 
 mod bench;
+mod drivers;
 mod soak;
 mod test;
 
+use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 
 const USAGE: &str = "\
 Usage: cargo xtask TASK
 
-  test     install what the tests need (Mesa lavapipe), check format and lints, run every test
+  test     install what the tests need (Mesa lavapipe), check format and lints, run every test on
+           every driver that is there (--help for its options)
   bench    run the benchmarks side by side and print their table (--help for its options)
   soak     render for 30 minutes, or as many as are named, and fail if memory grows
 ";
@@ -55,4 +58,17 @@ fn run(command: &mut Command) -> Result<(), String> {
 /// The cargo that runs this task.
 fn cargo() -> Command {
     Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
+}
+
+/// The repository.
+fn root() -> &'static Path {
+    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    here.parent().unwrap_or(here)
+}
+
+/// The program, as cargo has built it in `profile`'s folder.
+fn program(profile: &str) -> PathBuf {
+    let target = std::env::var_os("CARGO_TARGET_DIR");
+    let target = target.map_or_else(|| root().join("target"), PathBuf::from);
+    target.join(profile).join("gpu-trace")
 }

@@ -4,8 +4,7 @@ use std::process::{Child, Command, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use crate::bench::program;
-use crate::{cargo, run};
+use crate::{cargo, program, run};
 
 /// The scenes that share the time.
 const SCENES: [&str; 2] = ["lecture", "glass"];
@@ -51,7 +50,7 @@ fn soak(scene: &str, seconds: f64) -> Result<(), String> {
     let folder = std::env::temp_dir().join(format!("gpu-trace-soak-{}", std::process::id()));
     std::fs::create_dir_all(&folder).map_err(|e| e.to_string())?;
     // More samples than any device takes in that time.
-    let mut child = Command::new(program())
+    let mut child = Command::new(program("release"))
         .args([scene, "--sample-range", "0..281474976710656"])
         .args(["--time", &format!("{seconds}s"), "--progress", "json"])
         .args(["-o", "soak.exr"])

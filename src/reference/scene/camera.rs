@@ -2,13 +2,14 @@
 
 use glam::DVec2;
 
+use super::priority::Media;
 use super::ray::Ray;
 use crate::placement::PlacedCamera;
 use crate::reference::core::sampling::circle_point;
 
-/// The ray through the place `u[0..2]` of a pixel and `u[2..4]` of the lens.
+/// The ray through the place `u[0..2]` of a pixel and `u[2..4]` of the lens, in `media`.
 #[must_use]
-pub fn camera_ray(camera: &PlacedCamera, pixel: [u32; 2], u: [f64; 4]) -> Ray {
+pub fn camera_ray(camera: &PlacedCamera, pixel: [u32; 2], u: [f64; 4], media: &Media) -> Ray {
     let place = DVec2::new(f64::from(pixel[0]) + u[0], f64::from(pixel[1]) + u[1]);
     let film = camera.corner + place.x * camera.across + place.y * camera.down;
     let disc = u[2].sqrt() * circle_point(u[3]);
@@ -19,5 +20,6 @@ pub fn camera_ray(camera: &PlacedCamera, pixel: [u32; 2], u: [f64; 4]) -> Ray {
         direction: (camera.forward + film - camera.focus * lens).normalize(),
         own: None,
         inward: false,
+        media: media.clone(),
     }
 }

@@ -2,10 +2,13 @@
 
 use glam::DVec3;
 
+use super::priority::Media;
 use crate::placement::PlacedSphere;
+use crate::reference::bsdf::sample::BsdfSample;
+use crate::settings::Offset;
 
 /// A ray; see the kernel's source for the members.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 #[expect(missing_docs, reason = "the members are those of the kernel's struct")]
 pub struct Ray {
     pub anchor: DVec3,
@@ -13,6 +16,7 @@ pub struct Ray {
     pub direction: DVec3,
     pub own: Option<usize>,
     pub inward: bool,
+    pub media: Media,
 }
 
 /// The nearest hit of a ray.
@@ -52,4 +56,52 @@ pub fn vertex_at(ray: &Ray, hit: &Hit, sphere: &PlacedSphere) -> Vertex {
         offset,
         normal,
     }
+}
+
+/// The ray that goes on from a vertex. Whoever crosses a dielectric's surface changes its `media`.
+#[must_use]
+pub fn leave(arrived: Ray, hit: &Hit, vertex: &Vertex, s: &BsdfSample, offset: Offset) -> Ray {
+    let mut ray = Ray {
+        anchor: vertex.anchor,
+        offset: vertex.offset,
+        direction: s.direction,
+        own: Some(hit.index),
+        inward: hit.inside != s.crossed,
+        media: arrived.media,
+    };
+    if offset == Offset::Exact {
+        return ray;
+    }
+    let point = arrived.anchor + (arrived.offset + hit.t * arrived.direction);
+    let out = if s.crossed {
+        -vertex.normal
+    } else {
+        vertex.normal
+    };
+    ray.own = None;
+    ray.anchor = DVec3::ZERO;
+    ray.offset = match offset.distances() {
+        Some([back, away]) => point - back * arrived.direction + away * out,
+        None => ulp_away(point, out),
+    };
+    ray
+}
+
+/// Moves a point by so many ulp *of f32* along n, or near the origin by a fixed length.
+#[must_use]
+pub fn ulp_away(p: DVec3, n: DVec3) -> DVec3 {
+    let component = |p: f64, n: f64| {
+        if p.abs() < 1.0 / 32.0 {
+            return p + n / 65536.0;
+        }
+        let steps = (256.0 * n) as i32;
+        let bits = (p as f32).to_bits() as i32;
+        let steps = if p < 0.0 { -steps } else { steps };
+        f64::from(f32::from_bits(bits.wrapping_add(steps) as u32))
+    };
+    DVec3::new(
+        component(p.x, n.x),
+        component(p.y, n.y),
+        component(p.z, n.z),
+    )
 }

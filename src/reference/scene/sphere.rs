@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use super::priority::is_within;
 use super::ray::{Hit, Ray};
 use crate::placement::{PlacedSphere, Side};
 
@@ -75,9 +76,15 @@ pub fn closest_hit(ray: &Ray, spheres: &[PlacedSphere]) -> Option<Hit> {
         let inside = match sphere.side {
             Side::Outside => false,
             Side::Inside => true,
-            Side::Either if own => ray.inward,
-            Side::Either => q.c < 0.0,
+            Side::Tracked => is_within(&ray.media, index),
+            Side::Sign if own => ray.inward,
+            Side::Sign => q.c < 0.0,
         };
+        if sphere.container.is_some_and(|c| !is_within(&ray.media, c))
+            || sphere.core.is_some_and(|c| is_within(&ray.media, c))
+        {
+            continue;
+        }
         let t = if inside {
             Some(root_interior(&q, own))
         } else {

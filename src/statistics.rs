@@ -1,40 +1,47 @@
-//! Tests of hypotheses. All p-values are two-sided or upper tails, as each function says.
+//! Tests of hypotheses, for `check` and for the tests. All p-values are two-sided or upper tails, as each function says.
 
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
 /// The significance of a whole family of tests.
-pub(crate) const SIGNIFICANCE: f64 = 1.0e-3;
+pub const SIGNIFICANCE: f64 = 1.0e-3;
 
 /// The level of each of `count` tests such that all together have [`SIGNIFICANCE`] (Sidak).
-pub(crate) fn sidak(count: usize) -> f64 {
+#[must_use]
+pub fn sidak(count: usize) -> f64 {
     // 1 - (1 - a)^(1/n), without the cancellation.
     -((-SIGNIFICANCE).ln_1p() / count as f64).exp_m1()
 }
 
 /// The size that none of `count` standard normal deviates exceeds, at [`SIGNIFICANCE`].
-pub(crate) fn normal_limit(count: usize) -> f64 {
+#[must_use]
+pub fn normal_limit(count: usize) -> f64 {
     Normal::standard().inverse_cdf(1.0 - 0.5 * sidak(count))
 }
 
 /// Two-sided p-value of a standard normal deviate.
-pub(crate) fn normal_p(z: f64) -> f64 {
+#[must_use]
+pub fn normal_p(z: f64) -> f64 {
     2.0 * Normal::standard().sf(z.abs())
 }
 
 /// What a chi-square test found.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct ChiSquare {
+pub struct ChiSquare {
     /// The statistic.
-    pub(crate) statistic: f64,
+    pub statistic: f64,
     /// Degrees of freedom, after pooling.
-    pub(crate) freedom: usize,
+    pub freedom: usize,
     /// Probability of a statistic at least as large.
-    pub(crate) p: f64,
+    pub p: f64,
 }
 
 /// Counts against expected probabilities, which sum to 1. Cells with fewer than 5 expected counts
 /// are pooled into one; if that has fewer too, more than 20 unexpected counts make the test fail.
-pub(crate) fn chi_square(counts: &[u64], probabilities: &[f64]) -> ChiSquare {
+///
+/// # Panics
+/// If there are not as many probabilities as counts, if they do not sum to 1, or if one cell is left.
+#[must_use]
+pub fn chi_square(counts: &[u64], probabilities: &[f64]) -> ChiSquare {
     assert_eq!(counts.len(), probabilities.len());
     let total: f64 = probabilities.iter().sum();
     assert!(
@@ -81,7 +88,8 @@ pub(crate) fn chi_square(counts: &[u64], probabilities: &[f64]) -> ChiSquare {
 
 /// p-value of the two-sided Kolmogorov-Smirnov test of `values` against the uniform distribution on
 /// [0, 1). The asymptotic series, for thousands of values.
-pub(crate) fn uniform_ks(values: &mut [f64]) -> f64 {
+#[must_use]
+pub fn uniform_ks(values: &mut [f64]) -> f64 {
     values.sort_by(f64::total_cmp);
     let n = values.len() as f64;
     let distance = values
@@ -105,7 +113,8 @@ pub(crate) fn uniform_ks(values: &mut [f64]) -> f64 {
 }
 
 /// Pearson's correlation.
-pub(crate) fn correlation(a: &[f64], b: &[f64]) -> f64 {
+#[must_use]
+pub fn correlation(a: &[f64], b: &[f64]) -> f64 {
     let n = a.len().min(b.len());
     let mean = |v: &[f64]| v[..n].iter().sum::<f64>() / n as f64;
     let (ma, mb) = (mean(a), mean(b));
@@ -119,7 +128,8 @@ pub(crate) fn correlation(a: &[f64], b: &[f64]) -> f64 {
 }
 
 /// Mean and standard error of the mean.
-pub(crate) fn mean_and_error(values: &[f64]) -> (f64, f64) {
+#[must_use]
+pub fn mean_and_error(values: &[f64]) -> (f64, f64) {
     let n = values.len() as f64;
     let mean = values.iter().sum::<f64>() / n;
     let variance = values.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0);

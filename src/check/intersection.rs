@@ -1,0 +1,427 @@
+//! Cases 1, 3, 4 and 6 to 9: a ray against one sphere, by the kernel's own solvers.
+//!
+//! The truth is the same formula in f64, with the f32 numbers that the kernel got.
+
+use glam::DVec3;
+
+use super::context::Context;
+use super::inputs::Random;
+use super::{Case, Measure, Run};
+use crate::error::Result;
+use crate::reference::scene::sphere::{
+    Quadratic, pole_quadratic, root_interior, root_outside, sphere_quadratic,
+};
+
+pub(super) const CASES: &[Case] = &[
+    Case {
+        id: 1,
+        name: "a far sphere",
+        setup: "radius 1 at distances 1e3 to 1e5, impact below 0.99: distance in units of \
+                8 ulp(D) (1 + b/sqrt(R^2 - b^2)); no wrong hit or miss",
+        run: Run::On(far),
+    },
+    Case {
+        id: 3,
+        name: "a huge sphere from nearby",
+        setup: "radius 1e3 to 1e8, from 0.01 to 10 above or below the surface: distance in units \
+                of its bound, 1e-6 (1 + (|B| + |d|)/S) and the rounding of C",
+        run: Run::On(huge),
+    },
+    Case {
+        id: 4,
+        name: "a tiny sphere, left and crossed",
+        setup: "radius 1e-8 to 1e-3: a leaving ray does not hit it again, one that goes inside \
+                comes to the far side after the chord, to 1e-6 r",
+        run: Run::On(tiny),
+    },
+    Case {
+        id: 6,
+        name: "grazing rays",
+        setup: "impact R (1 +- e), e = 1e-7 to 1e-3, from distances to 1e3: hit or miss is wrong \
+                only within 4 ulp(D) of the silhouette",
+        run: Run::On(grazing),
+    },
+    Case {
+        id: 7,
+        name: "from inside",
+        setup: "from the exact centre, from 1 ulp within the wall and between, radius 1e-4 to \
+                1e4: distance in units of 8 ulp(R) (1 + R/s)",
+        run: Run::On(inside),
+    },
+    Case {
+        id: 8,
+        name: "leaving rays do not return",
+        setup: "radius 1e-4 to 1e4 and, by their poles, 1e4 to 1e8: leaving rays, n.d = 0 and \
+                +-1e-8 among them, must not hit the sphere that they are on",
+        run: Run::On(reintersect),
+    },
+    Case {
+        id: 9,
+        name: "directions of any length",
+        setup: "|d| = 1e-15 to 1e15: t |d| is that of the unit direction to 4 ulp",
+        run: Run::On(lengths),
+    },
+];
+
+pub(super) type Row = [f32; 4];
+
+pub(super) const NO_HIT: f64 = 3.0e38f32 as f64;
+
+/// Twice the unit roundoff: the largest relative error of an f32 operation, rounded either way.
+pub(super) const ULP: f64 = 1.0 / (1 << 23) as f64;
+
+/// The distance of f32 numbers of the size of x.
+pub(super) fn ulp(x: f64) -> f64 {
+    (x.abs().log2().floor() - 23.0).exp2()
+}
+
+pub(super) fn to_row(v: DVec3, w: f64) -> Row {
+    [v.x as f32, v.y as f32, v.z as f32, w as f32]
+}
+
+pub(super) fn vector(row: Row) -> DVec3 {
+    DVec3::new(f64::from(row[0]), f64::from(row[1]), f64::from(row[2]))
+}
+
+/// A ray from distance `distance` whose line passes the centre at `impact`: origin and direction.
+fn ray(random: &mut Random, distance: f64, impact: f64) -> (DVec3, DVec3) {
+    let d = random.direction();
+    let across = d.cross(random.direction()).normalize();
+    let along = (distance * distance - impact * impact).max(0.0).sqrt();
+    (impact * across - along * d, d)
+}
+
+/// Rays against spheres about their centres: [f, radius], [direction, 0].
+fn solve(context: &Context, inputs: &[[Row; 2]]) -> Result<Vec<[Row; 2]>> {
+    context.probe(&[])?.call("sphere_quadratic", inputs)
+}
+
+/// The twin on the same numbers, with the radius times `factor`; and the impact parameter.
+fn twin([f, d]: [Row; 2], factor: f64) -> (Quadratic, f64) {
+    let (radius, f, d) = (factor * f64::from(f[3]), vector(f), vector(d));
+    let impact = f.cross(d).length() / d.length();
+    (sphere_quadratic(f, d, radius), impact)
+}
+
+/// Whether the line of a ray passes so near to the silhouette that f32 may say either.
+fn undecided(impact: f64, radius: f64, distance: f64) -> bool {
+    (impact - radius).abs() <= 4.0 * ulp(distance)
+}
+
+fn far(context: &Context) -> Result<Measure> {
+    let mut random = Random::new("far");
+    let inputs: Vec<[Row; 2]> = (0..context.size(50_000, 500_000))
+        .map(|_| {
+            let distance = random.magnitude(3.0, 5.0);
+            let impact = random.range(0.0, 0.99);
+            let (f, d) = ray(&mut random, distance, impact);
+            [to_row(f, 1.0), to_row(d, 0.0)]
+        })
+        .collect();
+    let outputs = solve(context, &inputs)?;
+    let mut measure = Measure::new(1.0, "of the bound");
+    for (input, [_, t]) in inputs.iter().zip(&outputs) {
+        let (q, impact) = twin(*input, context.disturbed(1.0e-2));
+        let distance = vector(input[0]).length();
+        // Rounded to f32, some impacts are beyond the radius.
+        if undecided(impact, 1.0, distance) {
+            continue;
+        }
+        let t = f64::from(t[0]);
+        let error = match root_outside(&q, false) {
+            Some(truth) => {
+                let slope = impact / (1.0 - impact * impact).max(0.0).sqrt();
+                (t - truth).abs() / (8.0 * ulp(distance) * (1.0 + slope))
+            }
+            None if t == NO_HIT => 0.0,
+            None => f64::INFINITY,
+        };
+        measure.add(error, || {
+            format!("from {distance:.6e}, impact {impact:.6}: t = {t}")
+        });
+    }
+    Ok(measure)
+}
+
+fn grazing(context: &Context) -> Result<Measure> {
+    let mut random = Random::new("grazing");
+    let inputs: Vec<[Row; 2]> = (0..context.size(50_000, 500_000))
+        .map(|_| {
+            let radius = random.magnitude(-3.0, 3.0);
+            let e = random.magnitude(-7.0, -3.0) * (random.unit() - 0.5).signum();
+            let distance = radius * random.magnitude(0.1, 3.0);
+            let (f, d) = ray(&mut random, distance, radius * (1.0 + e));
+            [to_row(f, radius), to_row(d, 0.0)]
+        })
+        .collect();
+    let outputs = solve(context, &inputs)?;
+    let mut measure = Measure::new(0.0, "wrong hits or misses");
+    for (input, [_, t]) in inputs.iter().zip(&outputs) {
+        let radius = f64::from(input[0][3]);
+        let (q, impact) = twin(*input, context.disturbed(1.0e-3));
+        let distance = vector(input[0]).length();
+        if undecided(impact, radius, distance) {
+            continue;
+        }
+        let hits = f64::from(t[0]) != NO_HIT;
+        let wrong = hits != root_outside(&q, false).is_some();
+        measure.count(1, u64::from(wrong), || {
+            format!("radius {radius:e} from {distance:e}, impact {impact:e}: hit {hits}")
+        });
+    }
+    Ok(measure)
+}
+
+fn lengths(context: &Context) -> Result<Measure> {
+    let mut random = Random::new("lengths");
+    let mut inputs: Vec<[Row; 2]> = Vec::new();
+    for _ in 0..context.size(20_000, 200_000) {
+        let distance = random.range(1.5, 20.0);
+        let impact = random.range(0.0, 0.9);
+        let (f, d) = ray(&mut random, distance, impact);
+        // A power of two: the direction stays the same.
+        let scale = random.range(-50.0, 50.0).round().exp2();
+        let unit = to_row(d, 0.0);
+        inputs.push([to_row(f, 1.0), unit]);
+        inputs.push([to_row(f, 1.0), unit.map(|x| (f64::from(x) * scale) as f32)]);
+    }
+    let outputs = solve(context, &inputs)?;
+    let mut measure = Measure::new(4.0, "ulp");
+    for (pair, out) in inputs.chunks_exact(2).zip(outputs.chunks_exact(2)) {
+        let (unit, other) = (f64::from(out[0][1][0]), f64::from(out[1][1][0]));
+        let scale = vector(pair[1][1]).length() / vector(pair[0][1]).length();
+        let unit = unit * context.disturbed(1.0e-5);
+        measure.add((other * scale - unit).abs() / ulp(unit), || {
+            format!("length {scale:e}: t = {other:e}, {unit} for length 1")
+        });
+    }
+    Ok(measure)
+}
+
+fn huge(context: &Context) -> Result<Measure> {
+    let mut random = Random::new("huge");
+    let inputs: Vec<[Row; 3]> = (0..context.size(50_000, 500_000))
+        .map(|_| {
+            let radius = random.magnitude(3.0, 8.0);
+            let n = random.direction();
+            let side = if random.unit() < 0.5 { -1.0 } else { 1.0 };
+            let height = side * random.magnitude(-2.0, 1.0);
+            let across = random.range(-30.0, 30.0) * n.any_orthonormal_vector();
+            let d = random.direction();
+            let d = if d.dot(n) * height > 0.0 { -d } else { d };
+            [
+                to_row(height * n + across, 1.0 / radius),
+                to_row(d, 0.0),
+                to_row(n, 0.0),
+            ]
+        })
+        .collect();
+    let probe = context.probe(&["interior", "pole"])?;
+    let outputs: Vec<[Row; 3]> = probe.call("pole_quadratic", &inputs)?;
+    let mut measure = Measure::new(1.0, "of the bound");
+    for ([x, d, n], [_, outside, inside]) in inputs.iter().zip(&outputs) {
+        let k = context.disturbed(1.0e-2) * f64::from(x[3]);
+        let (x, d, n) = (vector(*x), vector(*d), vector(*n));
+        // What the disturbance moves is the surface, by about its height.
+        let lift = (context.disturbed(1.0e-3) - 1.0) * n;
+        let q = pole_quadratic(x + lift, d, n, k);
+        let c_error = ULP * (5.0 * k * x.length_squared() + 6.0 * x.length() + q.c.abs());
+        let root = if q.c < 0.0 {
+            Some((f64::from(inside[0]), root_interior(&q, false)))
+        } else {
+            root_outside(&q, false).map(|truth| (f64::from(outside[0]), truth))
+        };
+        // Near the horizon f32 may say either, and so may it on the surface.
+        let b_error = 1.0e-6 * (k * x.length() + 1.0) * d.length();
+        let square_error =
+            2.0 * q.b.abs() * b_error + q.a * c_error + 4.0 * ULP * (q.b * q.b + q.a * q.c.abs());
+        let Some((t, truth)) = root else { continue };
+        if q.square < 4.0 * square_error || q.c.abs() < 16.0 * c_error {
+            continue;
+        }
+        let s = q.square.sqrt();
+        let bound = 1.0e-6 * (1.0 + (q.b.abs() + d.length()) / s) + c_error / q.c.abs();
+        measure.add((t / truth - 1.0).abs() / bound, || {
+            format!("R = {:e}, x = {x}, d = {d}: t = {t} for {truth}", 1.0 / k)
+        });
+    }
+    Ok(measure)
+}
+
+fn inside(context: &Context) -> Result<Measure> {
+    let mut random = Random::new("inside");
+    let inputs: Vec<[Row; 6]> = (0..context.size(50_000, 500_000))
+        .map(|i| {
+            let radius = f64::from(random.magnitude(-4.0, 4.0) as f32);
+            let share = match i % 3 {
+                0 => 0.0,
+                1 => 1.0 - 2.0 * ULP,
+                _ => random.unit(),
+            };
+            let from = share * radius * random.direction();
+            bounce_rows(from, true, random.direction(), radius, None)
+        })
+        .collect();
+    let outputs = bounce(context, &inputs)?;
+    let mut measure = Measure::new(1.0, "of the bound");
+    for (rows, [t, ..]) in inputs.iter().zip(&outputs) {
+        let radius = f64::from(rows[3][3]) * context.disturbed(1.0e-4);
+        let q = sphere_quadratic(vector(rows[1]), vector(rows[2]), radius);
+        let truth = root_interior(&q, false);
+        let s = q.square.max(0.0).sqrt();
+        let bound = 8.0 * ulp(radius) * (1.0 + radius / s);
+        let t = f64::from(t[0]);
+        measure.add((t - truth).abs() / bound, || {
+            let at = vector(rows[1]).length() / radius;
+            format!("from {at} of radius {radius:e}: t = {t:e} for {truth:e}")
+        });
+    }
+    Ok(measure)
+}
+
+/// Rows of `probe_bounce` for a ray from `from` in the frame of a sphere, about its centre or with
+/// a pole; the next direction is filled in later.
+pub(super) fn bounce_rows(
+    from: DVec3,
+    inside: bool,
+    d: DVec3,
+    radius: f64,
+    pole: Option<DVec3>,
+) -> [Row; 6] {
+    let frame_radius = if pole.is_some() { 0.0 } else { radius };
+    [
+        to_row(DVec3::ZERO, f64::from(u8::from(inside))),
+        to_row(from, 0.0),
+        to_row(d, 1.0 / radius),
+        to_row(DVec3::ZERO, frame_radius),
+        to_row(pole.unwrap_or_default(), 0.0),
+        [0.0; 4],
+    ]
+}
+
+/// Paths that hit a sphere, go on and meet it again or not.
+pub(super) fn bounce(context: &Context, inputs: &[[Row; 6]]) -> Result<Vec<[Row; 3]>> {
+    let probe = context.probe(&["dielectric", "interior", "pole"])?;
+    probe.call("bounce", inputs)
+}
+
+/// Outward normal where the ray of `rows` first hits, by the twin; `None` for a miss.
+pub(super) fn normal_at_hit(rows: &[Row; 6], inside: bool) -> Option<DVec3> {
+    let (x, d) = (vector(rows[1]), vector(rows[2]));
+    let curvature = f64::from(rows[2][3]);
+    let pole = (rows[3][3] == 0.0).then(|| vector(rows[4]));
+    let q = match pole {
+        Some(n) => pole_quadratic(x, d, n, curvature),
+        None => sphere_quadratic(x, d, f64::from(rows[3][3])),
+    };
+    let t = if inside {
+        root_interior(&q, false)
+    } else {
+        root_outside(&q, false)?
+    };
+    let hit = x + t * d;
+    Some((pole.unwrap_or_default() + curvature * hit).normalize())
+}
+
+/// A direction on the side of `n`, one in four of them grazing.
+pub(super) fn leaving(random: &mut Random, n: DVec3, i: usize) -> DVec3 {
+    let tangent = n.cross(random.direction()).normalize();
+    match i % 16 {
+        0 => tangent,
+        4 => tangent + 1.0e-8 * n,
+        8 => tangent - 1.0e-8 * n,
+        12 => (tangent + 1.0e-3 * random.unit() * n).normalize(),
+        _ => {
+            let d = random.direction();
+            if d.dot(n) < 0.0 { -d } else { d }
+        }
+    }
+}
+
+fn tiny(context: &Context) -> Result<Measure> {
+    let mut random = Random::new("tiny");
+    let mut inputs: Vec<[Row; 6]> = Vec::new();
+    for i in 0..context.size(50_000, 500_000) {
+        let radius = f64::from(random.magnitude(-8.0, -3.0) as f32);
+        let distance = radius * random.range(1.5, 4.0);
+        let impact = 0.98 * radius * random.unit().sqrt();
+        let (from, d) = ray(&mut random, distance, impact);
+        let mut rows = bounce_rows(from, false, d, radius, None);
+        let Some(n) = normal_at_hit(&rows, false) else {
+            continue;
+        };
+        let crossed = i % 2 == 1;
+        let next = leaving(&mut random, n, if crossed { 1 } else { i });
+        rows[5] = to_row(
+            if crossed { -next } else { next },
+            f64::from(u8::from(crossed)),
+        );
+        inputs.push(rows);
+    }
+    let outputs = bounce(context, &inputs)?;
+    let mut measure = Measure::new(1.0e-6, "of the radius");
+    for (rows, [t, offset, _]) in inputs.iter().zip(&outputs) {
+        let radius = f64::from(rows[3][3]);
+        let (next, again) = (vector(rows[5]), f64::from(t[1]));
+        let error = if rows[5][3] == 0.0 {
+            // Not hit again; how far away it would have been does not matter.
+            if again == NO_HIT { 0.0 } else { f64::INFINITY }
+        } else {
+            let n = vector(*offset).normalize();
+            let chord = -2.0 * radius * n.dot(next) / next.length_squared();
+            (again - chord * context.disturbed(1.0e-4)).abs() * next.length() / radius
+        };
+        measure.add(error, || {
+            format!(
+                "radius {radius:e}, crossed {}: next hit at {again:e}",
+                rows[5][3]
+            )
+        });
+    }
+    Ok(measure)
+}
+
+fn reintersect(context: &Context) -> Result<Measure> {
+    let mut random = Random::new("reintersect");
+    let mut inputs: Vec<[Row; 6]> = Vec::new();
+    for i in 0..context.size(100_000, 1_000_000) {
+        let mut rows = if i % 2 == 0 {
+            let radius = random.magnitude(-4.0, 4.0);
+            let distance = radius * random.range(1.1, 10.0);
+            let impact = radius * random.unit().sqrt();
+            let (from, d) = ray(&mut random, distance, impact);
+            bounce_rows(from, false, d, radius, None)
+        } else {
+            let (n, radius) = (random.direction(), random.magnitude(4.0, 8.0));
+            let across = random.range(-4.0, 4.0) * n.any_orthonormal_vector();
+            let d = random.direction();
+            let d = if d.dot(n) > 0.0 { -d } else { d };
+            bounce_rows(random.unit() * n + across, false, d, radius, Some(n))
+        };
+        let Some(n) = normal_at_hit(&rows, false) else {
+            continue;
+        };
+        let next = leaving(&mut random, n, i / 2);
+        // The disturbance: one in a hundred goes inside, and must be seen to come back.
+        let crossed = context.options.disturb && i % 100 == 0;
+        rows[5] = to_row(
+            if crossed { -next } else { next },
+            f64::from(u8::from(crossed)),
+        );
+        inputs.push(rows);
+    }
+    let outputs = bounce(context, &inputs)?;
+    let mut measure = Measure::new(0.0, "rays that return");
+    for (rows, [t, ..]) in inputs.iter().zip(&outputs) {
+        // What f32 took for a miss has no surface to leave.
+        if f64::from(t[0]) == NO_HIT {
+            continue;
+        }
+        let again = f64::from(t[1]);
+        measure.count(1, u64::from(again != NO_HIT), || {
+            let radius = 1.0 / f64::from(rows[2][3]);
+            format!("radius {radius:e}: hit again at {again:e}")
+        });
+    }
+    Ok(measure)
+}
