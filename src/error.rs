@@ -44,7 +44,7 @@ pub enum Error {
 }
 
 impl Error {
-    /// The exit code of the process: 2 for what the user can correct in the input, 130 or 143
+    /// The exit code of the process: 2 for what the user can correct in the input, 129, 130 or 143
     /// after a signal, 3 if a check failed, else 1.
     #[must_use]
     pub fn exit_code(&self) -> u8 {

@@ -82,7 +82,7 @@ impl Tally {
 }
 
 /// Where a sample was no finite number.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 pub struct NonFinite {
     /// The pixel, in the whole image.
     pub pixel: [u32; 2],

@@ -39,6 +39,8 @@ pub enum StoppedBy {
     Time,
     /// The user or the system said so.
     Interrupt,
+    /// The renderer failed.
+    Failure,
 }
 
 /// Where a render is, for a progress display.
@@ -132,7 +134,7 @@ pub fn render(renderer: &mut dyn Renderer, settings: &Settings, watch: &mut dyn 
             }
             Err(error) => {
                 failure = Some(error);
-                break StoppedBy::Interrupt;
+                break StoppedBy::Failure;
             }
         }
         estimate = Estimate::of(&film);

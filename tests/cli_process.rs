@@ -3,84 +3,12 @@
 
 mod cli_support;
 
-use std::io::{BufRead, BufReader, Read};
-use std::process::{Child, ChildStderr, Command, Stdio};
+use std::process::{Command, Stdio};
 use std::thread::sleep;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use cli_support::{Folder, Run, holds};
+use cli_support::{Background, Folder, Run, holds};
 use serde_json::json;
-
-/// A run in the background, killed when the test ends.
-struct Background {
-    child: Child,
-    stderr: BufReader<ChildStderr>,
-}
-
-impl Background {
-    fn start(folder: &Folder, arguments: &str) -> Self {
-        let mut command = folder.command(arguments);
-        command.stdout(Stdio::piped()).stderr(Stdio::piped());
-        let mut child = command.spawn().expect("the program starts");
-        let stderr = BufReader::new(child.stderr.take().expect("a pipe"));
-        Self { child, stderr }
-    }
-
-    /// Waits for a line on stderr that holds `part`.
-    fn wait_for(&mut self, part: &str) {
-        let mut line = String::new();
-        while !line.contains(part) {
-            line.clear();
-            let length = self.stderr.read_line(&mut line).expect("stderr is text");
-            assert!(length > 0, "the run ended without {part:?}");
-        }
-    }
-
-    fn signal(&self, name: &str) {
-        let mut kill = Command::new("kill");
-        let status = kill
-            .arg(format!("-{name}"))
-            .arg(self.child.id().to_string())
-            .status();
-        assert!(status.is_ok_and(|status| status.success()), "kill -{name}");
-    }
-
-    /// Whether it still runs.
-    fn runs(&mut self) -> bool {
-        self.child
-            .try_wait()
-            .expect("it can be waited for")
-            .is_none()
-    }
-
-    fn finish(mut self) -> Run {
-        let deadline = Instant::now() + Duration::from_secs(60);
-        while self.runs() {
-            assert!(Instant::now() < deadline, "the run does not end");
-            sleep(Duration::from_millis(10));
-        }
-        let (mut stdout, mut stderr) = (Vec::new(), Vec::new());
-        let pipe = self.child.stdout.as_mut().expect("a pipe");
-        pipe.read_to_end(&mut stdout).expect("the rest of stdout");
-        self.stderr
-            .read_to_end(&mut stderr)
-            .expect("the rest of stderr");
-        let status = self.child.wait().expect("it has ended");
-        Run::new(std::process::Output {
-            status,
-            stdout,
-            stderr,
-        })
-    }
-}
-
-impl Drop for Background {
-    fn drop(&mut self) {
-        // Fails where it has ended already, as it should have.
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
-}
 
 #[test]
 fn a_signal_ends_a_render_with_what_there_is() {
@@ -238,7 +166,7 @@ fn an_image_beyond_memory_is_refused_before_any_work() {
     assert_eq!(run.code, Some(2), "{run:?}");
     holds(
         &run.stderr,
-        &["error: 65536x65536 pixels need 512.0 GiB", "--crop"],
+        &["error: 65536x65536 pixels need 512 GiB", "--crop"],
     );
     assert_eq!(folder.names(), [""; 0]);
     let run = limited("--size 65536x65536 --crop 40000,30000,8x8");

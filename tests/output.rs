@@ -729,6 +729,7 @@ fn statistics() -> Stats {
         variance: stats::VarianceClass::HeavyTailed,
         black: false,
         non_finite: 0,
+        first_non_finite: None,
         bounce_limit: stats::BounceLimit {
             throughput: f64::INFINITY,
             ..Default::default()
@@ -766,6 +767,7 @@ fn statistics_are_valid_json() {
         "estimated_error",
         "variance",
         "non_finite",
+        "first_non_finite",
         "stopped_by",
         "version",
         "max_bounces",

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 use gpu_trace::error::Error;
+use gpu_trace::placement::Placement;
 use gpu_trace::scene::load::{load_file, load_str};
 use gpu_trace::scene::{Handedness, MaterialKind, builtin, summary};
 
@@ -197,6 +198,51 @@ fn numbers_outside_of_their_range_are_refused() {
         "#,
     ) {
         check(&from, &to, &place, &[&part]);
+    }
+}
+
+/// Lengths that are legal alone and whose squares or inverses no f64 holds.
+#[test]
+fn lengths_too_small_to_compute_with_are_refused_or_of_use() {
+    check(
+        "look_at = [0.0, 0.0, 6.0]",
+        "look_at = [0.0, 1e-200, -4.0]",
+        "3:11",
+        &["`look_at` is too near to the camera's `position`"],
+    );
+    check(
+        "focus_distance = 4.0",
+        "focus_distance = 1e-300",
+        "8:18",
+        &["`focus_distance` is too small", "help: the least is 1e-140"],
+    );
+    let tiny = |text: &str| {
+        let small = ["1e-150", "5e-324", "1e-300"].into_iter();
+        small.fold(text.replace("radius = 1.0", "radius = 0.5"), |text, r| {
+            text.replacen("\nradius = 0.5", &format!("\nradius = {r}"), 1)
+        })
+    };
+    let Err(Error::Scene(text)) = load_str("bad.toml", &tiny(GOOD)) else {
+        panic!("no sphere can be computed with");
+    };
+    let parts = ["the spheres are too small", "┌─ bad.toml:32:10\n", "1e-140"];
+    assert!(parts.iter().all(|part| text.contains(part)), "{text}");
+
+    for (from, to) in [
+        ("up = [0.0, 1.0, 0.0]", "up = [0.0, 1e-300, 1e-300]"),
+        ("up = [0.0, 1.0, 0.0]", "up = [0.0, 5e-324, 0.0]"),
+        ("look_at = [0.0, 0.0, 6.0]", "look_at = [1e-120, 0.0, 6.0]"),
+        ("focus_distance = 4.0", "focus_distance = 1e-130"),
+        ("radius = 1.0", "radius = 5e-324"),
+    ] {
+        assert!(GOOD.contains(from), "{from}");
+        let scene = load_str("good", &GOOD.replacen(from, to, 1));
+        let scene = scene.unwrap_or_else(|error| panic!("{to}: {error}")).scene;
+        let camera = Placement::new(&scene, 64, 48).camera;
+        for vector in [camera.forward, camera.across, camera.down, camera.lens_down] {
+            assert!(vector.is_finite(), "{to}: {camera:?}");
+        }
+        assert!(camera.across.length() > 0.0 && camera.focus.is_finite());
     }
 }
 

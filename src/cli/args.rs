@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 
+use super::fault::Fault;
 use super::values;
 use crate::effects::BAKED_MOST;
 use crate::error::{Error, Result};
@@ -56,6 +57,12 @@ pub struct RenderArgs {
         help = "Write the kernel as plain WGSL before rendering"
     )]
     pub dump_wgsl: Option<PathBuf>,
+    #[arg(
+        long,
+        help_heading = "Output",
+        help = "Only warn of samples that are not finite; without it they make the render fail"
+    )]
+    pub allow_non_finite: bool,
     #[arg(
         long,
         value_name = "MODE",
@@ -218,6 +225,13 @@ pub struct RenderArgs {
         allow_negative_numbers = true, help_heading = "Device", help = "Threads of the CPU reference [default: one a core]"
     )]
     pub threads: Option<u16>,
+    #[arg(
+        long,
+        value_name = "KIND@WINDOW",
+        hide = true,
+        help = "Let something fail, for tests"
+    )]
+    pub inject_fault: Option<Fault>,
 }
 
 macro_rules! choices {

@@ -4,9 +4,11 @@ mod args;
 mod check;
 mod devices;
 mod effects;
+mod fault;
 mod render;
 mod scene;
 mod shell;
+mod signals;
 mod values;
 
 use std::io::Write as _;
@@ -32,8 +34,8 @@ Examples:
   gpu-trace effects my.toml                    what the kernel will hold, and why
   gpu-trace check --quick                      does this adapter stand the hard cases?
 
-Exit codes: 0 done; 1 failed; 2 wrong usage or a bad scene; 3 a check failed; 130 or 143 ended by a signal, with what
-there was written.";
+Exit codes: 0 done; 1 failed; 2 wrong usage or a bad scene; 3 a check failed; 129, 130 or 143 ended
+by a signal, with what there was written.";
 
 /// Path-traces scenes made of spheres on a GPU, without a display.
 ///
@@ -189,8 +191,45 @@ fn derive(scene: &Scene, settings: &Settings) -> Result<(Placement, Effects)> {
             placement.media.levels
         )));
     }
+    check_magnitudes(&placement)?;
     let effects = Effects::derive(scene, &placement, settings);
     Ok((placement, effects))
+}
+
+/// Refuses what the kernel's f32 cannot hold in the scene's own unit: next to a sphere of radius 1e20,
+/// one of radius 1e-20 has no size left.
+fn check_magnitudes(placement: &Placement) -> Result<()> {
+    let refuse = |what: &str| {
+        Err(Error::Scene(format!(
+            "{what} in units of the whole scene is a number that the device cannot hold: the \
+             scene's lengths lie too many orders of magnitude apart"
+        )))
+    };
+    for sphere in &placement.spheres {
+        let radius = sphere.radius as f32;
+        // The kernel needs the inverse, too.
+        if !radius.is_normal() || !radius.recip().is_normal() {
+            return refuse(&format!("the radius of sphere {}", sphere.source + 1));
+        }
+        if !sphere.anchor.as_vec3().is_finite() {
+            return refuse(&format!("the center of sphere {}", sphere.source + 1));
+        }
+    }
+    if !placement.light.is_finite() {
+        return Err(Error::Scene(
+            "the brightest light of the scene is too dark to compute with".into(),
+        ));
+    }
+    let camera = &placement.camera;
+    if !(camera.approach as f32).is_finite() {
+        return refuse("the camera's distance from the scene");
+    }
+    let lens = [camera.lens_across, camera.lens_down].map(|axis| axis.as_vec3());
+    let focus = [camera.focus as f32, camera.lens_share as f32];
+    if !lens.iter().all(|axis| axis.is_finite()) || !focus.iter().all(|x| x.is_finite()) {
+        return refuse("the camera's lens");
+    }
+    Ok(())
 }
 
 /// Prints a result. A reader that has seen enough (`| head`) is no error.

@@ -1,15 +1,16 @@
 //! `gpu-trace render`: from a scene file to images.
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use super::args::{BackendArg, RenderArgs};
+use super::fault::Faulty;
+use super::signals::Signals;
 use super::{derive, print};
 use crate::effects::Effects;
 use crate::error::{Error, Result};
 use crate::estimate::{VarianceClass, VarianceReport, energy_cut_at_most, variance_class};
+use crate::film::NonFinite;
 use crate::gpu::device::{self, DRIVER_ADVICE, DeviceChoice, Gpu};
 use crate::gpu::renderer::GpuRenderer;
 use crate::output::stats::{BounceLimit, Device, Seconds};
@@ -78,6 +79,9 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
     progress.finish();
 
     warnings.extend(observations(&outcome, &job.settings));
+    if args.allow_non_finite {
+        warnings.extend(not_finite(&outcome));
+    }
     for warning in &warnings[said..] {
         progress.warning(warning);
     }
@@ -101,24 +105,60 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
         warnings,
         ..stats
     };
-    finish(args, &job, &outcome, &stats)?;
-    if let Some(failure) = outcome.failure {
-        return Err(failure);
+    let written = finish(args, &job, &outcome, &stats);
+    if let Some(failure) = &outcome.failure {
+        return Err(failed(failure, &outcome, &job, written));
     }
-    if let Some(first) = outcome.film.tally().first_non_finite {
+    written?;
+    if let Some(text) = not_finite(&outcome).filter(|_| !args.allow_non_finite) {
         return Err(Error::NonFinite(format!(
-            "{} samples were not finite and are in no sum; the first: pixel ({}, {}), sample {}, \
-             after bounce {}",
-            outcome.film.tally().non_finite,
-            first.pixel[0],
-            first.pixel[1],
-            first.sample,
-            first.bounce
+            "{text} (--allow-non-finite makes this a warning)"
         )));
     }
     signals
         .code()
         .map_or(Ok(()), |code| Err(Error::Interrupted(code)))
+}
+
+/// A failure in the middle of a render, with what became of the samples before it.
+fn failed(failure: &Error, outcome: &Outcome, job: &Job, written: Result<()>) -> Error {
+    let saved = match (outcome.film.samples(), written) {
+        (0, _) => "no samples were done, and no file was changed".to_owned(),
+        (spp, Ok(())) => format!(
+            "the {spp} samples a pixel done before are in {}",
+            job.files()
+        ),
+        (_, Err(error)) => error.to_string(),
+    };
+    Error::Gpu(format!("{failure}; {saved}"))
+}
+
+/// What to say of samples that were not finite; `None` without any.
+fn not_finite(outcome: &Outcome) -> Option<String> {
+    let tally = outcome.film.tally();
+    (tally.non_finite > 0).then(|| {
+        let first = tally.first_non_finite.map_or_else(String::new, place);
+        format!(
+            "{} samples were not finite and are in no sum; {first}",
+            tally.non_finite
+        )
+    })
+}
+
+fn place(first: NonFinite) -> String {
+    let [x, y] = first.pixel;
+    format!(
+        "the first: pixel ({x}, {y}), sample {}, after bounce {}",
+        first.sample, first.bounce
+    )
+}
+
+impl Job {
+    /// The images, as they were typed.
+    fn files(&self) -> String {
+        let files: Vec<String> = self.targets.iter().map(ToString::to_string).collect();
+        files.join(", ")
+    }
 }
 
 /// Loads and decides everything; checks the outputs. Touches no device and no file.
@@ -137,7 +177,7 @@ fn prepare(args: &RenderArgs) -> Result<Job> {
     outputs.extend(args.stats.as_deref());
     outputs.extend(args.dump_wgsl.as_deref());
     check_all(&outputs, args.scene_file().as_slice())?;
-    check_memory(&settings.crop)?;
+    check_memory(&settings.crop, PIXEL_BYTES)?;
     let (placement, effects) = derive(&loaded.scene, &settings)?;
     let variance = variance_class(&loaded.scene, &placement, &settings);
     Ok(Job {
@@ -166,10 +206,12 @@ fn render_job(renderer: &mut dyn Renderer, job: &Job, watch: &mut dyn Watch) -> 
 
 /// Bytes of memory that a pixel takes: 48 each in film and window, and room for the files.
 const PIXEL_BYTES: usize = 128;
+/// The same with the CPU reference, whose sums in the middle of a window are larger.
+const CPU_PIXEL_BYTES: usize = 256;
 
 /// Refuses an image that would end the program in the middle for want of memory.
-fn check_memory(crop: &Rect) -> Result<()> {
-    let bytes = crop.pixels().saturating_mul(PIXEL_BYTES);
+fn check_memory(crop: &Rect, pixel_bytes: usize) -> Result<()> {
+    let bytes = crop.pixels().saturating_mul(pixel_bytes);
     let mut room: Vec<u8> = Vec::new();
     let there = room.try_reserve_exact(bytes).is_ok();
     // Without this, the compiler may leave the allocation out and assume that it works.
@@ -178,11 +220,11 @@ fn check_memory(crop: &Rect) -> Result<()> {
         return Ok(());
     }
     Err(Error::Usage(format!(
-        "{}x{} pixels need {:.1} GiB of memory, more than there is: choose a smaller --size, or \
+        "{}x{} pixels need {} GiB of memory, more than there is: choose a smaller --size, or \
          render parts of the image with --crop",
         crop.width,
         crop.height,
-        bytes as f64 / f64::from(1 << 30),
+        significant(bytes as f64 / f64::from(1 << 30)),
     )))
 }
 
@@ -213,18 +255,23 @@ fn open(args: &RenderArgs, warnings: &mut Vec<String>) -> Result<Option<Gpu>> {
 
 fn renderer(gpu: Option<Gpu>, args: &RenderArgs, job: &Job) -> Result<Box<dyn Renderer>> {
     let (scene, placement, settings) = (&job.loaded.scene, &job.placement, &job.settings);
-    Ok(match gpu {
-        Some(gpu) => Box::new(GpuRenderer::new(
-            gpu,
-            scene,
-            placement,
-            &job.effects,
-            settings,
-        )?),
+    let device = gpu.clone().filter(|_| args.inject_fault.is_some());
+    let (renderer, pixel_bytes): (Box<dyn Renderer>, _) = match gpu {
+        Some(gpu) => {
+            let renderer = GpuRenderer::new(gpu, scene, placement, &job.effects, settings)?;
+            (Box::new(renderer), PIXEL_BYTES)
+        }
         None => {
             let threads = args.threads.map_or(0, usize::from);
-            Box::new(ReferenceRenderer::new(scene, placement, settings, threads)?)
+            let renderer = ReferenceRenderer::new(scene, placement, settings, threads)?;
+            (Box::new(renderer), CPU_PIXEL_BYTES)
         }
+    };
+    // Again, after the driver has taken its part.
+    check_memory(&settings.crop, pixel_bytes)?;
+    Ok(match args.inject_fault {
+        Some(fault) => Box::new(Faulty::new(renderer, device, fault)?),
+        None => renderer,
     })
 }
 
@@ -285,6 +332,7 @@ fn statistics(job: &Job, outcome: &Outcome, backend: &str, device: Device) -> St
         variance: job.variance.class,
         black: outcome.estimate.is_black(),
         non_finite: tally.non_finite,
+        first_non_finite: tally.first_non_finite,
         bounce_limit: BounceLimit {
             paths: tally.cut_paths,
             throughput: tally.cut_throughput,
@@ -327,7 +375,6 @@ fn finish(args: &RenderArgs, job: &Job, outcome: &Outcome, stats: &Stats) -> Res
 
 /// One line.
 fn summary(job: &Job, stats: &Stats) -> String {
-    let files: Vec<String> = job.targets.iter().map(ToString::to_string).collect();
     let error = match stats.estimated_error {
         Some(error) => format!("error {}", percent(error)),
         None if stats.black => "black".into(),
@@ -341,6 +388,7 @@ fn summary(job: &Job, stats: &Stats) -> String {
         StoppedBy::Error => ", error reached",
         StoppedBy::Time => ", time is up",
         StoppedBy::Interrupt => ", interrupted",
+        StoppedBy::Failure => ", failed",
     };
     let limit = &stats.bounce_limit;
     let cut = match (limit.paths, limit.energy_at_most) {
@@ -351,9 +399,16 @@ fn summary(job: &Job, stats: &Stats) -> String {
         ),
         (paths, None) => format!(", bounce limit cut {paths} paths"),
     };
+    let lost = stats.first_non_finite.map_or_else(String::new, |first| {
+        format!(
+            ", {} samples not finite ({})",
+            stats.non_finite,
+            place(first)
+        )
+    });
     format!(
-        "{}: {}x{}, {} spp{stopped}, {error}{cut}, {:.2} s, {} Mpaths/s on {}\n",
-        files.join(", "),
+        "{}: {}x{}, {} spp{stopped}, {error}{cut}{lost}, {:.2} s, {} Mpaths/s on {}\n",
+        job.files(),
         stats.width,
         stats.height,
         stats.spp,
@@ -391,41 +446,6 @@ fn write_file(path: &Path, bytes: &[u8]) -> Result<()> {
         },
         other => other,
     })
-}
-
-/// SIGINT and SIGTERM: the first asks to stop, the second ends the process.
-struct Signals {
-    interrupt: Arc<AtomicBool>,
-    terminate: Arc<AtomicBool>,
-}
-
-impl Signals {
-    fn listen() -> Result<Self> {
-        use signal_hook::consts::{SIGINT, SIGTERM};
-        let signals = Self {
-            interrupt: Arc::default(),
-            terminate: Arc::default(),
-        };
-        let register = |signal, flag: &Arc<AtomicBool>| {
-            signal_hook::flag::register_conditional_shutdown(
-                signal,
-                128 + signal,
-                Arc::clone(flag),
-            )?;
-            signal_hook::flag::register(signal, Arc::clone(flag))
-        };
-        register(SIGINT, &signals.interrupt)
-            .and_then(|_| register(SIGTERM, &signals.terminate))
-            .map_err(|e| Error::Usage(format!("cannot listen for signals: {e}")))?;
-        Ok(signals)
-    }
-
-    fn code(&self) -> Option<i32> {
-        if self.terminate.load(Ordering::Relaxed) {
-            return Some(143);
-        }
-        self.interrupt.load(Ordering::Relaxed).then_some(130)
-    }
 }
 
 /// Shows the render loop's status, and asks for signals.

@@ -1,6 +1,6 @@
 //! Adapters and devices: finding, choosing, opening, and noticing when one fails.
 
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crate::error::{Error, Result};
 
@@ -34,7 +34,7 @@ pub struct Gpu {
     pub limits: wgpu::Limits,
     /// What it is.
     pub summary: AdapterSummary,
-    faults: Arc<Mutex<Vec<String>>>,
+    faults: Faults,
 }
 
 /// How to choose among adapters.
@@ -217,7 +217,6 @@ pub fn open(choice: &DeviceChoice) -> Result<Gpu> {
             summary.index, summary.name
         )));
     }
-    let faults = Arc::new(Mutex::new(Vec::new()));
     let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
         label: Some("gpu-trace"),
         required_limits: summary.limits.clone(),
@@ -229,32 +228,54 @@ pub fn open(choice: &DeviceChoice) -> Result<Gpu> {
             summary.index, summary.name
         ))
     })?;
-    let sink = Arc::clone(&faults);
-    device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
-        let text = match error {
-            wgpu::Error::OutOfMemory { .. } => "the device is out of memory".to_owned(),
-            other => format!("the device reports: {other}"),
-        };
-        sink.lock()
-            .unwrap_or_else(std::sync::PoisonError::into_inner)
-            .push(text);
-    }));
-    let sink = Arc::clone(&faults);
-    device.set_device_lost_callback(move |reason, message| {
-        if reason != wgpu::DeviceLostReason::Destroyed {
-            let text = format!("the device is lost: {message}");
-            sink.lock()
-                .unwrap_or_else(std::sync::PoisonError::into_inner)
-                .push(text);
-        }
-    });
-    Ok(Gpu {
+    let gpu = Gpu {
         device,
         queue,
         limits: summary.limits.clone(),
         summary: summary.clone(),
-        faults,
-    })
+        faults: Faults::default(),
+    };
+    let faults = gpu.faults.clone();
+    gpu.device
+        .on_uncaptured_error(Arc::new(move |error: wgpu::Error| faults.report(&error)));
+    let faults = gpu.faults.clone();
+    // Whatever the reason: a device that is only dropped has nobody left who would ask.
+    gpu.device
+        .set_device_lost_callback(move |_, message| faults.lost(&message));
+    Ok(gpu)
+}
+
+/// What a device has reported, in order.
+#[derive(Clone, Debug, Default)]
+struct Faults(Arc<Mutex<Vec<String>>>);
+
+const OUT_OF_MEMORY: &str = "the device is out of memory";
+
+impl Faults {
+    fn list(&self) -> MutexGuard<'_, Vec<String>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn report(&self, error: &wgpu::Error) {
+        let mut list = self.list();
+        // What has no memory is invalid from then on, which every use of it would report again.
+        if list.last().is_some_and(|last| last == OUT_OF_MEMORY) {
+            return;
+        }
+        list.push(match error {
+            wgpu::Error::OutOfMemory { .. } => OUT_OF_MEMORY.to_owned(),
+            other => format!("the device reports: {other}"),
+        });
+    }
+
+    fn lost(&self, message: &str) {
+        // A device that was destroyed gives no reason.
+        let reason = match message.trim_end_matches('.') {
+            "" => String::new(),
+            reason => format!(": {reason}"),
+        };
+        self.list().push(format!("the device is lost{reason}"));
+    }
 }
 
 /// Real GPUs first; of the same kind, the more direct interface first.
@@ -272,15 +293,17 @@ fn preference(summary: &AdapterSummary) -> (usize, usize, usize) {
 }
 
 impl Gpu {
+    /// Takes note of an error as if the device had reported it.
+    pub fn report(&self, error: &wgpu::Error) {
+        self.faults.report(error);
+    }
+
     /// Says whether the device has reported a failure since it was opened.
     ///
     /// # Errors
     /// [`Error::Gpu`] with all that it reported.
     pub fn check(&self) -> Result<()> {
-        let faults = self
-            .faults
-            .lock()
-            .unwrap_or_else(std::sync::PoisonError::into_inner);
+        let faults = self.faults.list();
         if faults.is_empty() {
             return Ok(());
         }

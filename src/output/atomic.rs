@@ -1,5 +1,6 @@
 //! Writes a file in one step: the bytes go to a temporary file beside it, which then takes its
 //! name. A reader sees the old content or the new one, never a part; a full disk leaves the old one.
+//! A process that is killed in between leaves its temporary file, `.gpu-trace-*.tmp`, and no more.
 
 use std::fs::{self, File, OpenOptions, Permissions};
 use std::io::{self, Write};

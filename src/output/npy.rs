@@ -184,7 +184,8 @@ impl Header {
             Some(("<f8", "")) => 8,
             _ => {
                 return Err(invalid(format!(
-                    "values of type {descr}; wanted '<f4' or '<f8'"
+                    "values of type {}; wanted '<f4' or '<f8'",
+                    shown(descr)
                 )));
             }
         };
@@ -199,7 +200,8 @@ impl Header {
         }
         let [height, width] = rows_and_columns(shape).ok_or_else(|| {
             invalid(format!(
-                "an array of shape {shape}; wanted (height, width, 3), none of them 0"
+                "an array of shape {}; wanted (height, width, 3), none of them 0",
+                shown(shape)
             ))
         })?;
         Ok(Self {
@@ -265,14 +267,17 @@ fn ended_early(error: io::Error) -> io::Error {
 }
 
 fn malformed(header: &str) -> io::Error {
-    // A corrupt header can be long and hold control characters.
-    let shown: String = header
-        .trim()
-        .chars()
-        .take(80)
-        .flat_map(char::escape_debug)
-        .collect();
-    invalid(format!("the header is malformed: {shown}"))
+    invalid(format!("the header is malformed: {}", shown(header)))
+}
+
+/// A part of the header as a message may show it: what is corrupt can be long and hold control
+/// characters.
+fn shown(text: &str) -> String {
+    let visible = |c: char| match c {
+        '\'' | '"' => vec![c],
+        _ => c.escape_debug().collect(),
+    };
+    text.trim().chars().take(80).flat_map(visible).collect()
 }
 
 fn invalid(text: impl Into<String>) -> io::Error {

@@ -8,6 +8,7 @@ use serde::Serialize;
 use super::{Metadata, atomic};
 use crate::error::{Error, Result};
 pub use crate::estimate::VarianceClass;
+pub use crate::film::NonFinite;
 pub use crate::render::StoppedBy;
 
 /// All that is known of a finished render. The names are those of the JSON, which users' scripts
@@ -61,8 +62,10 @@ pub struct Stats {
     pub variance: VarianceClass,
     /// Whether no light at all was found, which leaves the error without meaning.
     pub black: bool,
-    /// Samples that were not finite.
+    /// Samples that were not finite; they are in no sum.
     pub non_finite: u64,
+    /// The first of these; `null` without any.
+    pub first_non_finite: Option<NonFinite>,
     /// What the limit on bounces cut off.
     pub bounce_limit: BounceLimit,
     /// What ended the render.

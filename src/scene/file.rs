@@ -78,7 +78,7 @@ pub(super) struct CameraTable {
     /// Distance of the plane in focus along the view axis; needed with a lens.
     #[serde(default)]
     #[schemars(with = "f64", range(max = MAX_MAGNITUDE), extend("exclusiveMinimum" = 0.0))]
-    pub(super) focus_distance: Option<f64>,
+    pub(super) focus_distance: Option<Spanned<f64>>,
 }
 
 /// Which way image right is.
@@ -194,8 +194,8 @@ pub(super) struct SphereTable {
     #[schemars(schema_with = "point")]
     pub(super) center: [f64; 3],
     /// Its radius.
-    #[schemars(range(max = MAX_MAGNITUDE), extend("exclusiveMinimum" = 0.0))]
-    pub(super) radius: f64,
+    #[schemars(with = "f64", range(max = MAX_MAGNITUDE), extend("exclusiveMinimum" = 0.0))]
+    pub(super) radius: Spanned<f64>,
     /// The name of its material.
     #[schemars(with = "String")]
     pub(super) material: Spanned<String>,

@@ -6,6 +6,7 @@ use glam::DVec3;
 use proptest::prelude::*;
 
 use super::load::load_str;
+use super::validate::SHORTEST;
 use super::{
     Camera, Handedness, MAX_BOUNCES, MAX_MAGNITUDE, MAX_SIDE, MAX_SPP, Material, MaterialKind,
     RenderDefaults, Scene, Sphere,
@@ -127,6 +128,9 @@ fn camera() -> impl Strategy<Value = Camera> {
     let point = || three((-1e3..1e3_f64).boxed());
     let lens = (prop_oneof![Just(0.0), positive()], positive());
     (point(), point(), point(), 0.1..179.9_f64, handedness, lens)
+        .prop_filter("lengths to compute with", |camera| {
+            camera.5.0 == 0.0 || camera.5.1 > SHORTEST
+        })
         .prop_filter("a direction and an upward one", |camera| {
             (camera.1 - camera.0).cross(camera.2).length() > 1e-3
         })
@@ -161,7 +165,9 @@ fn scene() -> impl Strategy<Value = Scene> {
         render,
         prop::option::of(radiance().prop_filter("not black", |r| *r != DVec3::ZERO)),
         materials,
-        prop::collection::vec(sphere, 0..8),
+        prop::collection::vec(sphere, 0..8).prop_filter("lengths to compute with", |spheres| {
+            spheres.is_empty() || spheres.iter().any(|sphere| sphere.1 > SHORTEST)
+        }),
     )
         .prop_map(|(camera, size, render, environment, materials, spheres)| {
             let materials: Vec<_> = materials

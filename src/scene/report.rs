@@ -16,6 +16,10 @@ const SHOWN: usize = 20;
 /// Of a longer line, only this many bytes around the place are shown.
 const LINE_WINDOW: usize = 160;
 
+/// Of a longer message, which then repeats a key or a name of the file, only the beginning and the
+/// end are shown.
+const LONGEST_TEXT: usize = 1000;
+
 /// Something to tell about one place of a scene file.
 #[derive(Clone, Debug)]
 pub(super) struct Problem {
@@ -132,23 +136,24 @@ impl<'a> Source<'a> {
             source: self,
             focus: span.clone(),
         };
-        let mut labels = vec![Label::primary((), span.clone()).with_message(&problem.label)];
+        let label = shortened(&problem.label);
+        let mut labels = vec![Label::primary((), span.clone()).with_message(label)];
         if let Some((also, label)) = &problem.also {
             let also = self.on_one_line(also);
             // The window of a long line is chosen for the first place and may exclude this one.
             let line = self.line(self.line_of(also.start)).unwrap_or_default();
             if line.len() <= LINE_WINDOW {
-                labels.push(Label::secondary((), also).with_message(label));
+                labels.push(Label::secondary((), also).with_message(shortened(label)));
             }
         }
         let diagnostic = Diagnostic::new(severity)
-            .with_message(&problem.message)
+            .with_message(shortened(&problem.message))
             .with_labels(labels)
             .with_notes(
                 problem
                     .help
                     .iter()
-                    .map(|help| format!("help: {help}"))
+                    .map(|help| format!("help: {}", shortened(help)))
                     .collect(),
             );
         match term::emit_into_string(&term::Config::default(), &view, &diagnostic) {
@@ -162,13 +167,15 @@ impl<'a> Source<'a> {
             // Cannot happen for spans that `on_one_line` made, but an error must get through.
             Err(_) => {
                 let line = self.line_of(span.start) + 1;
-                format!("error: {}\n  {}:{line}", problem.message, self.name)
+                let message = shortened(&problem.message);
+                format!("error: {message}\n  {}:{line}", self.name)
             }
         }
     }
 
-    /// The part of the span that lies on its first line, at character boundaries and on an
-    /// existing line: a place after the last newline is moved to the end of the last line.
+    /// The part of the span that lies on its first line and is short enough to be shown, at
+    /// character boundaries and on an existing line: a place after the last newline is moved to the
+    /// end of the last line.
     fn on_one_line(&self, span: &Range<usize>) -> Range<usize> {
         let mut start = self.text.floor_char_boundary(span.start);
         if start == self.text.len() && self.text.ends_with('\n') {
@@ -178,7 +185,8 @@ impl<'a> Source<'a> {
             .find('\n')
             .map_or(self.text.len(), |length| start + length);
         let end = self.text.ceil_char_boundary(span.end).min(line_end);
-        start..end.max(start)
+        let most = self.text.ceil_char_boundary(start + LINE_WINDOW);
+        start..end.min(most).max(start)
     }
 
     fn line_of(&self, byte: usize) -> usize {
@@ -239,6 +247,16 @@ impl<'a> files::Files<'a> for View<'a> {
         let end = self.focus.end.max(focus).min(range.end) + LINE_WINDOW / 2;
         Ok(start.max(range.start)..text.ceil_char_boundary(end).min(range.end))
     }
+}
+
+/// The text, without its middle if it is long.
+fn shortened(text: &str) -> Cow<'_, str> {
+    if text.len() <= LONGEST_TEXT {
+        return Cow::Borrowed(text);
+    }
+    let head = &text[..text.floor_char_boundary(LONGEST_TEXT / 2)];
+    let tail = &text[text.ceil_char_boundary(text.len() - LONGEST_TEXT / 4)..];
+    Cow::Owned(format!("{head} … {tail}"))
 }
 
 /// The text with control and direction-changing characters replaced by visible ones of the same
@@ -312,6 +330,24 @@ mod tests {
         let shown = shown(&text, 300_005..300_009);
         assert!(shown.contains("a.toml:1:300006"), "{shown}");
         assert!(shown.len() < 1000, "{}", shown.len());
+    }
+
+    #[test]
+    fn a_long_name_is_cut_wherever_it_is_repeated() {
+        let name = "é".repeat(30_000);
+        let text = format!("{name} = 1");
+        let problem = Problem::new(0..name.len(), format!("unknown `{name}` here"), &name);
+        let problem = problem.help(format!("not {name} but x"));
+        let report = Report {
+            errors: vec![problem],
+            warnings: Vec::new(),
+        };
+        let shown = report.error_text("a.toml", &text).expect("one error");
+        assert!(shown.starts_with("error: unknown `é"), "{shown}");
+        assert!(shown.contains("é` here\n"), "{shown}");
+        assert!(shown.contains("a.toml:1:1\n"), "{shown}");
+        assert!(shown.ends_with("é but x"), "{shown}");
+        assert!(shown.len() < 6000, "{}: {shown}", shown.len());
     }
 
     #[test]

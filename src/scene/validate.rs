@@ -5,8 +5,9 @@ use std::f64::consts::PI;
 use std::ops::Range;
 
 use glam::DVec3;
+use toml::Spanned;
 
-use super::file::{CameraTable, HandednessName, MaterialTable, SceneFile};
+use super::file::{CameraTable, HandednessName, MaterialTable, SceneFile, SphereTable};
 use super::report::{Problem, Report};
 use super::suggest::{list, nearest};
 use super::{Camera, Handedness, Material, MaterialKind, RenderDefaults, Scene, Sphere};
@@ -14,6 +15,10 @@ use super::{Camera, Handedness, Material, MaterialKind, RenderDefaults, Scene, S
 /// Directions whose angle has a smaller sine are parallel: of the sixteen digits of an f64 the
 /// cross product keeps half, which is what the f32 of the GPU needs.
 const PARALLEL: f64 = 1e-8;
+
+/// Below this length a vector's square, and that of its product with a direction that is hardly not
+/// parallel, is lost in an f64. Times the largest length, its inverse is still an f64.
+pub(super) const SHORTEST: f64 = 1e-140;
 
 /// A material may reflect this much more than everything without a warning: the lecture's ε = 0.01,
 /// µ = 10 with albedo 0.375 reflects 1.00018 and counts as energy-conserving.
@@ -70,10 +75,20 @@ pub(super) fn scene(file: SceneFile, report: &mut Report) -> Option<Scene> {
         }
         spheres.push(Sphere {
             center: vector(sphere.center),
-            radius: sphere.radius,
+            radius: *sphere.radius.get_ref(),
             material: index,
             priority: sphere.priority.as_ref().map(|priority| *priority.get_ref()),
         });
+    }
+
+    if let Some(largest) = largest(&file.sphere)
+        && *largest.get_ref() < SHORTEST
+    {
+        let message = "the spheres are too small to compute with: this is the largest `radius`";
+        let problem = Problem::new(largest.span(), message, "");
+        report
+            .errors
+            .push(problem.help(format!("one of them must have at least {SHORTEST:e}")));
     }
 
     let scene = Scene {
@@ -98,6 +113,12 @@ pub(super) fn scene(file: SceneFile, report: &mut Report) -> Option<Scene> {
     Some(scene)
 }
 
+/// The largest radius; the first of several.
+fn largest(spheres: &[SphereTable]) -> Option<&Spanned<f64>> {
+    let radii = spheres.iter().map(|sphere| &sphere.radius);
+    radii.reduce(|a, b| if b.get_ref() > a.get_ref() { b } else { a })
+}
+
 fn camera(table: &CameraTable, report: &mut Report) -> Option<Camera> {
     let position = vector(*table.position.get_ref());
     let look_at = vector(*table.look_at.get_ref());
@@ -107,6 +128,15 @@ fn camera(table: &CameraTable, report: &mut Report) -> Option<Camera> {
         .map_or(DVec3::Y, |up| vector(*up.get_ref()));
     let errors = report.errors.len();
     match direction(look_at - position) {
+        Some(_) if (look_at - position).abs().max_element() < SHORTEST => {
+            let message = "`look_at` is too near to the camera's `position` to look there";
+            let problem = Problem::new(table.look_at.span(), message, "");
+            report.errors.push(
+                problem
+                    .also(table.position.span(), "the position")
+                    .help("any point on the view axis will do: move it away"),
+            );
+        }
         None => {
             let problem = Problem::new(
                 table.look_at.span(),
@@ -166,19 +196,26 @@ fn camera(table: &CameraTable, report: &mut Report) -> Option<Camera> {
             ),
         }));
     }
+    let focus_distance = table.focus_distance.as_ref();
+    if let Some(distance) = focus_distance.filter(|d| aperture > 0.0 && *d.get_ref() < SHORTEST) {
+        let message = "`focus_distance` is too small to compute with";
+        let problem = Problem::new(distance.span(), message, "");
+        report
+            .errors
+            .push(problem.help(format!("the least is {SHORTEST:e}")));
+    }
     (report.errors.len() == errors).then(|| Camera {
         position,
         look_at,
-        up,
+        up: of_use(up),
         fov: table.fov,
         handedness: match table.handedness {
             HandednessName::Right => Handedness::Right,
             HandednessName::Left => Handedness::Left,
         },
         aperture_radius: aperture + 0.0,
-        focus_distance: table
-            .focus_distance
-            .unwrap_or_else(|| (look_at - position).length()),
+        focus_distance: focus_distance
+            .map_or_else(|| (look_at - position).length(), |d| *d.get_ref()),
     })
 }
 
@@ -186,6 +223,15 @@ fn camera(table: &CameraTable, report: &mut Report) -> Option<Camera> {
 fn direction(vector: DVec3) -> Option<DVec3> {
     let largest = vector.abs().max_element();
     (largest > 0.0).then(|| (vector / largest).normalize())
+}
+
+/// The vector, made longer by a power of two if computing with it would lose it.
+fn of_use(vector: DVec3) -> DVec3 {
+    if vector.abs().max_element() < SHORTEST {
+        vector * 2_f64.powi(900)
+    } else {
+        vector
+    }
 }
 
 /// The vector, without negative zeros: the two zeros are equal and must hash alike.

@@ -3,9 +3,11 @@
 
 use std::collections::BTreeMap;
 use std::fs;
+use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
-use std::time::{Duration, SystemTime};
+use std::process::{Child, ChildStderr, Command, Output, Stdio};
+use std::thread::sleep;
+use std::time::{Duration, Instant, SystemTime};
 
 use gpu_trace::output::{Picture, read_npy};
 use serde_json::Value;
@@ -193,6 +195,81 @@ impl Run {
         };
         assert!(!run.stderr.contains("panicked"), "{}", run.stderr);
         run
+    }
+}
+
+/// A run in the background, killed when the test ends.
+pub(crate) struct Background {
+    child: Child,
+    stderr: BufReader<ChildStderr>,
+}
+
+impl Background {
+    pub(crate) fn start(folder: &Folder, arguments: &str) -> Self {
+        Self::of(folder.command(arguments))
+    }
+
+    /// Starts a command of which stdout and stderr are read here.
+    pub(crate) fn of(mut command: Command) -> Self {
+        command.stdout(Stdio::piped()).stderr(Stdio::piped());
+        let mut child = command.spawn().expect("the program starts");
+        let stderr = BufReader::new(child.stderr.take().expect("a pipe"));
+        Self { child, stderr }
+    }
+
+    /// Waits for a line on stderr that holds `part`.
+    pub(crate) fn wait_for(&mut self, part: &str) {
+        let mut line = String::new();
+        while !line.contains(part) {
+            line.clear();
+            let length = self.stderr.read_line(&mut line).expect("stderr is text");
+            assert!(length > 0, "the run ended without {part:?}");
+        }
+    }
+
+    pub(crate) fn signal(&self, name: &str) {
+        let mut kill = Command::new("kill");
+        let status = kill
+            .arg(format!("-{name}"))
+            .arg(self.child.id().to_string())
+            .status();
+        assert!(status.is_ok_and(|status| status.success()), "kill -{name}");
+    }
+
+    /// Whether it still runs.
+    pub(crate) fn runs(&mut self) -> bool {
+        self.child
+            .try_wait()
+            .expect("it can be waited for")
+            .is_none()
+    }
+
+    pub(crate) fn finish(mut self) -> Run {
+        let deadline = Instant::now() + Duration::from_secs(60);
+        while self.runs() {
+            assert!(Instant::now() < deadline, "the run does not end");
+            sleep(Duration::from_millis(10));
+        }
+        let (mut stdout, mut stderr) = (Vec::new(), Vec::new());
+        let pipe = self.child.stdout.as_mut().expect("a pipe");
+        pipe.read_to_end(&mut stdout).expect("the rest of stdout");
+        self.stderr
+            .read_to_end(&mut stderr)
+            .expect("the rest of stderr");
+        let status = self.child.wait().expect("it has ended");
+        Run::new(std::process::Output {
+            status,
+            stdout,
+            stderr,
+        })
+    }
+}
+
+impl Drop for Background {
+    fn drop(&mut self) {
+        // Fails where it has ended already, as it should have.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
     }
 }
 

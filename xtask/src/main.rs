@@ -3,6 +3,7 @@
 mod bench;
 mod drivers;
 mod numerics;
+mod soak;
 mod test;
 
 use std::path::{Path, PathBuf};
@@ -15,6 +16,7 @@ Usage: cargo xtask TASK
            every driver that is there (--help for its options)
   bench    run the benchmarks side by side and print their table (--help for its options)
   numerics run `gpu-trace check` on every driver that is there, into the table of docs/numerics.md
+  soak     render for 30 minutes, or as many as are named, and fail if memory grows
 ";
 
 fn main() -> ExitCode {
@@ -25,6 +27,7 @@ fn main() -> ExitCode {
         Some("test") => test::all(&rest),
         Some("numerics") => numerics::all(),
         Some("bench") => bench::all(&rest),
+        Some("soak") => soak::all(&rest),
         Some("help" | "--help" | "-h") => {
             print!("{USAGE}");
             Ok(())

@@ -1,0 +1,919 @@
+//! Whatever a user's bytes reach, fed with damaged input: no panic, no hang, no flood of memory,
+//! and errors that say where they are.
+//!
+//! The inputs are numbered, and a number always gives the same input. `GPU_TRACE_FUZZ=1000000` in the
+//! environment sets how many there are of each kind, `GPU_TRACE_FUZZ_FIRST` with which they begin.
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+use std::fmt::Debug;
+use std::ops::Range;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use clap::Parser;
+use glam::DVec3;
+use gpu_trace::cli::{Cli, RenderArgs};
+use gpu_trace::effects::Effects;
+use gpu_trace::error::Error;
+use gpu_trace::media::MAX_LEVELS;
+use gpu_trace::output::{Picture, Target, npy, read_npy};
+use gpu_trace::placement::{PlacedCamera, Placement};
+use gpu_trace::scene::load::{Loaded, load_file, load_str};
+use gpu_trace::scene::{Scene, summary};
+use gpu_trace::settings::Settings;
+
+/// No input takes longer.
+const PATIENCE: Duration = Duration::from_secs(5);
+/// The longest input, in bytes.
+const LONGEST: usize = 1 << 16;
+/// Memory that any input may take ...
+const MEMORY: usize = 64 << 20;
+/// ... and more for each of its bytes.
+const MEMORY_PER_BYTE: usize = 1 << 10;
+
+// ---- Memory ----
+
+/// The system's allocator, with an account of what each thread holds.
+struct Counting;
+
+thread_local! {
+    static HELD: Cell<isize> = const { Cell::new(0) };
+    static PEAK: Cell<isize> = const { Cell::new(0) };
+}
+
+fn account(bytes: isize) {
+    let held = HELD.get() + bytes;
+    HELD.set(held);
+    PEAK.set(PEAK.get().max(held));
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+#[expect(unsafe_code, reason = "an allocator is unsafe; this one only counts")]
+// SAFETY: all is left to the system's allocator. The account needs no allocation itself.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        account(layout.size() as isize);
+        // SAFETY: the caller's promises are passed on.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        account(-(layout.size() as isize));
+        // SAFETY: as above.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+/// The most memory that `work` holds at once beyond what was held before, in bytes.
+fn peak_of<T>(work: impl FnOnce() -> T) -> (T, usize) {
+    let before = HELD.get();
+    PEAK.set(before);
+    let result = work();
+    (result, (PEAK.get() - before).max(0) as usize)
+}
+
+#[test]
+fn memory_is_counted() {
+    let (_, none) = peak_of(|| 1 + 1);
+    let (_, much) = peak_of(|| drop(std::hint::black_box(vec![1_u8; 3 << 20])));
+    assert!(none < 1 << 10, "{none}");
+    assert!((3 << 20..4 << 20).contains(&much), "{much}");
+}
+
+// ---- Inputs ----
+
+/// SplitMix64: any number gives a stream of its own.
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    /// A number below `end`; 0 if there is none.
+    fn below(&mut self, end: usize) -> usize {
+        (self.next() % end.max(1) as u64) as usize
+    }
+
+    fn chance(&mut self, one_in: usize) -> bool {
+        self.below(one_in) == 0
+    }
+
+    fn of<'a, T: ?Sized>(&mut self, choices: &[&'a T]) -> &'a T {
+        choices[self.below(choices.len())]
+    }
+
+    /// A number that is mostly small.
+    fn length(&mut self, most: usize) -> usize {
+        let most = most >> self.below(usize::BITS as usize - most.leading_zeros() as usize + 1);
+        self.below(most + 1)
+    }
+
+    /// A piece of `length`, mostly short.
+    fn piece(&mut self, length: usize) -> Range<usize> {
+        let start = self.below(length + 1);
+        start..start + self.length(length - start)
+    }
+}
+
+/// What numbers are replaced by.
+const NUMBERS: &[&str] = &[
+    "0",
+    "-0",
+    "-0.0",
+    "1",
+    "-1",
+    "0.5",
+    "1e400",
+    "-1e400",
+    "1e308",
+    "1e20",
+    "1.0000001e20",
+    "-1e20",
+    "1e-20",
+    "1e-45",
+    "1e-160",
+    "1e-300",
+    "5e-324",
+    "1e-400",
+    "nan",
+    "-nan",
+    "inf",
+    "-inf",
+    "+inf",
+    "65535",
+    "65536",
+    "65537",
+    "2147483647",
+    "2147483648",
+    "-2147483648",
+    "-2147483649",
+    "4294967295",
+    "4294967296",
+    "281474976710656",
+    "281474976710657",
+    "9223372036854775807",
+    "9223372036854775808",
+    "-9223372036854775808",
+    "99999999999999999999999999999999999999",
+    "0x7fffffffffffffff",
+    "0xff",
+    "0o17",
+    "0b1",
+    "1_000",
+    "1__0",
+    "_1",
+    "1.",
+    ".5",
+    "1e",
+    "1e+",
+    "+1",
+    "01",
+    "180",
+    "179.99999999999997",
+    "1979-05-27T07:32:00Z",
+    "07:32:00",
+    "true",
+    "\"1\"",
+    "[]",
+    "{}",
+    "''",
+];
+
+/// What is put anywhere.
+const TOKENS: &[&str] = &[
+    "[",
+    "]",
+    "[[",
+    "]]",
+    "{",
+    "}",
+    "=",
+    ",",
+    ".",
+    "#",
+    "\"",
+    "'",
+    "\"\"\"",
+    "'''",
+    "\n",
+    "\r\n",
+    "\r",
+    "\t",
+    " ",
+    "\0",
+    "\u{feff}",
+    "\u{1b}[2J",
+    "\u{202e}",
+    "\u{85}",
+    "é",
+    "部",
+    "🦀",
+    "\\",
+    "\\u0000",
+    "\\U0010ffff",
+    "\\ud800",
+    "[camera]",
+    "[image]",
+    "[render]",
+    "[environment]",
+    "[[sphere]]",
+    "[sphere]",
+    "[material]",
+    "[material.a]",
+    "[[material.a]]",
+    "camera",
+    "image",
+    "width",
+    "height",
+    "spp",
+    "max_bounces",
+    "radiance",
+    "position",
+    "look_at",
+    "up",
+    "fov",
+    "handedness",
+    "\"left\"",
+    "aperture_radius",
+    "focus_distance",
+    "type",
+    "\"diffuse\"",
+    "\"mirror\"",
+    "\"dielectric\"",
+    "\"reflective\"",
+    "albedo",
+    "reflectance",
+    "ior",
+    "specular",
+    "epsilon",
+    "mu",
+    "emission",
+    "center",
+    "radius",
+    "material",
+    "priority",
+    "= 1\n",
+    "= [0, 0, 0]",
+    "= {}\n",
+    "a.b.c = 1\n",
+    "priority = 1\n",
+    "aperture_radius = 0.1\n",
+    "focus_distance = 1\n",
+];
+
+const OPTIONS: &[&str] = &[
+    "--output",
+    "-o",
+    "--stats",
+    "--exposure",
+    "--dump-wgsl",
+    "--progress",
+    "--quiet",
+    "--verbose",
+    "--spp",
+    "--error",
+    "--time",
+    "--sample-range",
+    "--size",
+    "--crop",
+    "--seed",
+    "--integrator",
+    "--sampler",
+    "--max-bounces",
+    "--roulette",
+    "--termination",
+    "--backend",
+    "--device",
+    "--geometry",
+    "--threads",
+    "--allow-non-finite",
+    "--inject-fault",
+    "--",
+    "-",
+    "--help",
+    "=",
+];
+
+const VALUES: &[&str] = &[
+    "a.png",
+    "a.exr",
+    "a",
+    "/",
+    "",
+    "1%",
+    "0.5 %",
+    "30s",
+    "1h 30m",
+    "1y 1month 1w 1d",
+    "16..48",
+    "0..281474976710656",
+    "18446744073709551615..18446744073709551615",
+    "640x480",
+    "1,2,3x4",
+    "0,0,65536x65536",
+    "4294967295,4294967295,1x1",
+    "lecture",
+    "bsdf",
+    "on",
+    "off",
+    "auto",
+    "list",
+    "baked",
+    "cpu",
+    "json",
+    "device-lost@2",
+    "non-finite@18446744073709551615",
+    "99999999999999999999y",
+    "1e308",
+    "0.1e-400s",
+];
+
+/// The bounds of a random number or word in `text`.
+fn word(random: &mut Random, text: &[u8], is_part: impl Fn(u8) -> bool) -> Range<usize> {
+    let from = random.below(text.len() + 1);
+    let start = (from..text.len())
+        .find(|i| is_part(text[*i]))
+        .unwrap_or(text.len());
+    let length = text[start..]
+        .iter()
+        .take_while(|byte| is_part(**byte))
+        .count();
+    start..start + length
+}
+
+fn is_number(byte: u8) -> bool {
+    byte.is_ascii_digit() || matches!(byte, b'.' | b'-' | b'+')
+}
+
+fn is_word(byte: u8) -> bool {
+    byte.is_ascii_alphanumeric() || matches!(byte, b'_' | b'-' | b'.')
+}
+
+/// The bounds of a random line, with its end.
+fn line(random: &mut Random, text: &[u8]) -> Range<usize> {
+    let at = random.below(text.len() + 1);
+    let start = text[..at]
+        .iter()
+        .rposition(|byte| *byte == b'\n')
+        .map_or(0, |i| i + 1);
+    let length = text[start..].iter().position(|byte| *byte == b'\n');
+    start..length.map_or(text.len(), |length| start + length + 1)
+}
+
+/// A random change of one of 20 kinds.
+fn mutate(kind: usize, random: &mut Random, text: &mut Vec<u8>, seeds: &[Vec<u8>]) {
+    let length = text.len();
+    match kind {
+        // Numbers most of all: they get past the parser.
+        0..=4 => {
+            let range = word(random, text, is_number);
+            text.splice(range, random.of(NUMBERS).bytes());
+        }
+        5 => {
+            let (range, power) = (word(random, text, is_number), random.below(700));
+            let digits = random.below(1000);
+            let number = format!("{digits}e{}", power as i32 - 350);
+            text.splice(range, number.bytes());
+        }
+        6 => {
+            let range = word(random, text, is_word);
+            text.splice(range, random.of(TOKENS).bytes());
+        }
+        7 => {
+            let at = random.below(length + 1);
+            text.splice(at..at, random.of(TOKENS).bytes());
+        }
+        8 => {
+            let range = line(random, text);
+            text.drain(range);
+        }
+        9 | 10 => {
+            // A line again, once or up to the longest input, here or there.
+            let copy = text[line(random, text)].to_vec();
+            let most = LONGEST.saturating_sub(length) / copy.len().max(1);
+            let times = if random.chance(40) {
+                random.below(most + 1)
+            } else {
+                1
+            };
+            let at = line(random, text).start;
+            text.splice(at..at, copy.repeat(times));
+        }
+        11 => {
+            // A line moves.
+            let range = line(random, text);
+            let moved: Vec<u8> = text.drain(range).collect();
+            let at = line(random, text).start;
+            text.splice(at..at, moved);
+        }
+        12 => {
+            let range = random.piece(length);
+            text.drain(range);
+        }
+        13 => {
+            let range = random.piece(length);
+            let copy = text[range].to_vec();
+            let at = random.below(length + 1);
+            text.splice(at..at, copy);
+        }
+        14 => {
+            for _ in 0..random.length(8) {
+                if let Some(byte) = text.get_mut(random.below(length)) {
+                    *byte ^= 1 << random.below(8);
+                }
+            }
+        }
+        15 => {
+            let at = random.below(length + 1);
+            let bytes: Vec<u8> = (0..random.length(16))
+                .map(|_| random.next() as u8)
+                .collect();
+            text.splice(at..at, bytes);
+        }
+        16 => {
+            let other = &seeds[random.below(seeds.len())];
+            let (from, at) = (random.below(other.len()), random.below(length + 1));
+            text.truncate(at);
+            text.extend_from_slice(&other[from..]);
+        }
+        17 => {
+            let other = &seeds[random.below(seeds.len())];
+            let copy = other[line(random, other)].to_vec();
+            let at = line(random, text).start;
+            text.splice(at..at, copy);
+        }
+        18 => {
+            let length = if random.chance(10) {
+                random.below(LONGEST)
+            } else {
+                random.length(200)
+            };
+            let nested = nested(random, length);
+            let range = if random.chance(2) {
+                word(random, text, is_number)
+            } else {
+                let at = line(random, text).start;
+                at..at
+            };
+            text.splice(range, nested);
+        }
+        _ if random.chance(4) => {
+            let text_of = String::from_utf8_lossy(text).replace('\n', "\r\n");
+            *text = text_of.into_bytes();
+        }
+        _ => text.truncate(random.below(length + 1)),
+    }
+}
+
+/// About `length` bytes of one thing again and again: nests, long names, long strings.
+fn nested(random: &mut Random, length: usize) -> Vec<u8> {
+    let (open, middle, close) = random.of::<(&str, &str, &str)>(&[
+        &("[", "1", "]"),
+        &("{a = ", "1", "}"),
+        &("{a.b = ", "{}", "}"),
+        &("[[", "1", "]]"),
+        &("[{a = ", "1", "}]"),
+        &("a.", "b = 1\n", ""),
+        &("[a.", "b]\n", "]"),
+        &("[[a.b]]\n", "", ""),
+        &("[material.", "x]\n", ""),
+        &("\"", "", "\""),
+        &("x = \"", "é", "\"\n"),
+        &("0", ".5", ""),
+        &("9", "", ""),
+        &("é", " = 1\n", ""),
+        &("# ", "\n", ""),
+        &("\n", "", ""),
+        &("1, ", "", ""),
+        &("\\\"", "", ""),
+        &("\0", "", ""),
+        &("[[sphere]]\n", "", ""),
+        &(
+            "sphere = [{ center = [0, 0, 0], radius = 1, material = \"a\" }, ",
+            "]\n",
+            "",
+        ),
+        &("a = 1\n", "", ""),
+    ]);
+    let times = length / (open.len() + close.len());
+    let mut bytes = open.repeat(times);
+    bytes += middle;
+    // Now and then it is not closed.
+    if !random.chance(4) {
+        bytes += &close.repeat(times);
+    }
+    bytes.into_bytes()
+}
+
+/// Input `index`: a seed with some changes.
+fn input(kind: &str, index: u64, seeds: &[Vec<u8>]) -> Vec<u8> {
+    let kind = kind
+        .bytes()
+        .fold(0, |sum: u64, byte| sum * 31 + u64::from(byte));
+    let mut random = Random(kind.wrapping_mul(0x1_0000_0000) ^ index);
+    let mut text = seeds[random.below(seeds.len())].clone();
+    // A third has only other numbers: it gets furthest.
+    let kinds = if random.chance(3) { 6 } else { 20 };
+    for _ in 0..1 + random.length(12) {
+        let kind = random.below(kinds);
+        mutate(kind, &mut random, &mut text, seeds);
+        text.truncate(LONGEST);
+    }
+    text
+}
+
+#[test]
+fn inputs_are_the_same_each_time_and_differ() {
+    let seeds = scenes();
+    let inputs: Vec<_> = (0..1000).map(|index| input("a", index, &seeds)).collect();
+    let again: Vec<_> = (0..1000).map(|index| input("a", index, &seeds)).collect();
+    assert!(inputs == again);
+    let distinct: std::collections::BTreeSet<_> = inputs.iter().collect();
+    assert!(distinct.len() > 950, "{}", distinct.len());
+    assert!(inputs.iter().any(|input| input.len() > LONGEST / 2));
+    assert!(inputs.iter().any(|input| str::from_utf8(input).is_err()));
+}
+
+// ---- The harness ----
+
+/// What all inputs of a kind came to.
+#[derive(Debug, Default)]
+struct Tried {
+    accepted: u64,
+    refused: u64,
+    slowest: (Duration, u64),
+    largest: (usize, u64),
+}
+
+/// The numbers of the inputs: `count` of them, or as the environment says.
+fn numbers(count: u64) -> Range<u64> {
+    let number = |name: &str| {
+        std::env::var(name)
+            .ok()
+            .map(|text| text.parse().expect(name))
+    };
+    let first = number("GPU_TRACE_FUZZ_FIRST").unwrap_or(0);
+    first..first + number("GPU_TRACE_FUZZ").unwrap_or(count)
+}
+
+/// Feeds `check` with numbered inputs; it says whether an input was accepted, and panics at what
+/// must not be.
+fn fuzz(
+    kind: &str,
+    numbers: Range<u64>,
+    seeds: &[Vec<u8>],
+    check: impl Fn(u64, &[u8]) -> bool + Sync,
+) -> Tried {
+    let current: Mutex<(u64, Option<Instant>)> = Mutex::new((0, None));
+    let done = AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        // Something that hangs can only be told from outside.
+        scope.spawn(|| {
+            while !done.load(Ordering::Relaxed) {
+                let (index, since) = *current.lock().expect("no panic while it is locked");
+                if since.is_some_and(|since| since.elapsed() > 2 * PATIENCE) {
+                    eprintln!(
+                        "{kind} {index} hangs:\n{}",
+                        shown(&input(kind, index, seeds))
+                    );
+                    std::process::abort();
+                }
+                std::thread::sleep(Duration::from_millis(100));
+            }
+        });
+        let tried = catch_unwind(AssertUnwindSafe(|| {
+            let mut tried = Tried::default();
+            for index in numbers.clone() {
+                let bytes = input(kind, index, seeds);
+                let begin = Instant::now();
+                *current.lock().expect("no panic while it is locked") = (index, Some(begin));
+                let run = || catch_unwind(AssertUnwindSafe(|| check(index, &bytes)));
+                let (result, memory) = peak_of(run);
+                let took = begin.elapsed();
+                *current.lock().expect("no panic while it is locked") = (index, None);
+                let place = || format!("{kind} {index}, {} bytes:\n{}", bytes.len(), shown(&bytes));
+                match result {
+                    Ok(true) => tried.accepted += 1,
+                    Ok(false) => tried.refused += 1,
+                    Err(_) => panic!("the panic above is of {}", place()),
+                }
+                assert!(took < PATIENCE, "{took:?} for {}", place());
+                let most = MEMORY + MEMORY_PER_BYTE * bytes.len();
+                assert!(memory < most, "{memory} bytes of memory for {}", place());
+                tried.slowest = tried.slowest.max((took, index));
+                tried.largest = tried.largest.max((memory, index));
+            }
+            tried
+        }));
+        done.store(true, Ordering::Relaxed);
+        let tried = tried.unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+        eprintln!("{} of {kind}: {tried:?}", numbers.end - numbers.start);
+        tried
+    })
+}
+
+/// An input as a message can show it.
+fn shown(bytes: &[u8]) -> String {
+    let text = String::from_utf8_lossy(bytes);
+    let (head, tail) = (
+        text.chars().take(3000),
+        text.chars().count().saturating_sub(3000),
+    );
+    let head: String = head.flat_map(char::escape_debug).collect();
+    format!("{} ({tail} more)", head.replace("\\n", "\n"))
+}
+
+/// A harness that cannot fail proves nothing.
+#[test]
+fn the_harness_finds_what_it_looks_for() {
+    let finds = |check: fn(u64, &[u8]) -> bool| {
+        let seeds = [b"a = 1\n".to_vec()];
+        catch_unwind(|| fuzz("faults", 0..200, &seeds, check)).is_err()
+    };
+    assert!(!finds(|_, bytes| bytes.len() > 5));
+    assert!(finds(|_, bytes| bytes[..1].len() > 5));
+    assert!(finds(|_, _| vec![1_u8; 200 << 20].len() > 5));
+    assert!(catch_unwind(|| place_of("no place", "a.toml", "")).is_err());
+    assert!(catch_unwind(|| place_of("error: x\n  ┌─ a.toml:9:1", "a.toml", "a\nb\n")).is_err());
+    place_of("error: x\n  ┌─ a.toml:2:1", "a.toml", "a\nb\n");
+}
+
+// ---- Scenes ----
+
+/// The scene files but the largest.
+fn scenes() -> Vec<Vec<u8>> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut files = Vec::new();
+    for folder in ["scenes", "scenes/tests"] {
+        let entries = std::fs::read_dir(root.join(folder)).expect("the folder of scenes");
+        let paths = entries.map(|entry| entry.expect("an entry of the folder").path());
+        files.extend(paths.filter(|path| path.extension().is_some_and(|e| e == "toml")));
+    }
+    files.sort();
+    let read = |path| std::fs::read(path).expect("a file");
+    let seeds: Vec<_> = files
+        .iter()
+        .map(read)
+        .filter(|text| text.len() < 10_000)
+        .collect();
+    assert!(seeds.len() >= 10);
+    seeds
+}
+
+/// That an error of `file` is one that a user can work with: whole reports with a place that exists.
+fn place_of(error: &str, file: &str, text: &str) {
+    assert!(error.starts_with("error: "), "{error}");
+    assert!(error.len() < 100_000, "{} bytes", error.len());
+    let control = |c: char| c.is_control() && c != '\n' && c != '\t';
+    assert!(!error.contains(control), "{error:?}");
+    let place = error
+        .split_once(&format!("─ {file}:"))
+        .map(|(_, place)| place);
+    let place = place.and_then(|place| place.lines().next());
+    let place = place.and_then(|place| place.split_once(':'));
+    let (line, column) = place.unwrap_or_else(|| panic!("no place: {error}"));
+    let number = |text: &str| text.parse::<usize>().unwrap_or_else(|_| panic!("{error}"));
+    let (line, column) = (number(line), number(column));
+    let lines: Vec<&str> = text.split('\n').collect();
+    assert!((1..=lines.len()).contains(&line), "line {line}: {error}");
+    let most = lines[line - 1].chars().count() + 1;
+    assert!((1..=most).contains(&column), "column {column}: {error}");
+}
+
+/// Everything that is done with a scene before a device is asked for.
+fn use_scene(loaded: &Loaded) {
+    let scene = &loaded.scene;
+    let _ = summary(loaded);
+    let placement = Placement::new(scene, scene.width, scene.height);
+    assert_finite(&placement);
+    if placement.media.levels <= MAX_LEVELS {
+        let effects = Effects::derive(scene, &placement, &Settings::for_scene(scene));
+        assert!(effects.names().count() < 100);
+    }
+}
+
+fn assert_finite(placement: &Placement) {
+    let number = |name: &str, x: f64| assert!(x.is_finite(), "{name} is {x}");
+    let vector = |name: &str, x: DVec3| assert!(x.is_finite(), "{name} is {x}");
+    number("scale", placement.scale);
+    assert!(placement.scale > 0.0, "scale is {}", placement.scale);
+    number("light", placement.light);
+    assert!(placement.light > 0.0, "light is {}", placement.light);
+    for sphere in &placement.spheres {
+        vector("anchor", sphere.anchor);
+        number("radius", sphere.radius);
+        vector("pole", sphere.pole.unwrap_or_default());
+    }
+    let PlacedCamera {
+        anchor,
+        approach,
+        corner,
+        across,
+        down,
+        forward,
+        lens_across,
+        lens_down,
+        focus,
+        lens_share,
+    } = placement.camera;
+    vector("camera.anchor", anchor);
+    number("camera.approach", approach);
+    vector("camera.corner", corner);
+    vector("camera.across", across);
+    vector("camera.down", down);
+    vector("camera.forward", forward);
+    vector("camera.lens_across", lens_across);
+    vector("camera.lens_down", lens_down);
+    number("camera.focus", focus);
+    number("camera.lens_share", lens_share);
+}
+
+fn is_scene<T: Debug>(loaded: Result<T, Error>, text: &str) -> Option<T> {
+    match loaded {
+        Ok(loaded) => Some(loaded),
+        Err(Error::Scene(error)) => {
+            place_of(&error, "fuzz.toml", text);
+            None
+        }
+        Err(other) => panic!("{other}"),
+    }
+}
+
+#[test]
+fn no_bytes_upset_the_scene_loader() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("fuzz.toml");
+    let tried = fuzz("scenes", numbers(20_000), &scenes(), |_, bytes| {
+        let Ok(text) = str::from_utf8(bytes) else {
+            std::fs::write(&path, bytes).expect("it can be written");
+            return match load_file(&path) {
+                Err(Error::Scene(text)) => {
+                    assert!(
+                        text.starts_with("error: ") && text.contains("fuzz.toml"),
+                        "{text}"
+                    );
+                    false
+                }
+                other => panic!("{other:?}"),
+            };
+        };
+        let loaded = is_scene(load_str("fuzz.toml", text), text);
+        if let Some(loaded) = &loaded {
+            for warning in &loaded.warnings {
+                place_of(
+                    &warning.replacen("warning: ", "error: ", 1),
+                    "fuzz.toml",
+                    text,
+                );
+            }
+            use_scene(loaded);
+        }
+        loaded.is_some()
+    });
+    // Some damage is harmless, most is not.
+    assert!(tried.accepted > tried.refused / 50, "{tried:?}");
+    assert!(tried.refused > tried.accepted / 50, "{tried:?}");
+}
+
+// ---- NPY ----
+
+#[test]
+fn no_bytes_upset_the_npy_reader() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("fuzz.npy");
+    let mut seeds: Vec<Vec<u8>> = [(1, 1), (2, 1), (3, 5), (64, 64)]
+        .map(|(width, height)| {
+            Picture::new(width, height, vec![[0.5; 3]; (width * height) as usize])
+        })
+        .iter()
+        .map(npy::encode)
+        .collect();
+    for (version, header) in [
+        (
+            2,
+            "{'descr': '<f8', 'fortran_order': False, 'shape': (1, 1, 3)}\n",
+        ),
+        (
+            3,
+            "{\"shape\":(2,1,3,),\"descr\":\"<f4\",\"fortran_order\":False,}\n",
+        ),
+        (
+            1,
+            "{'descr': '<f4', 'fortran_order': True, 'shape': (4294967295, 4294967295, 3)}\n",
+        ),
+    ] {
+        let mut bytes = b"\x93NUMPY".to_vec();
+        bytes.extend([version, 0]);
+        let length = header.len() as u32;
+        let length = length.to_le_bytes();
+        bytes.extend(&length[..if version == 1 { 2 } else { 4 }]);
+        bytes.extend(header.bytes());
+        bytes.extend([0; 24]);
+        seeds.push(bytes);
+    }
+    let tried = fuzz("npy", numbers(20_000), &seeds, |index, bytes| {
+        let result = npy::decode(bytes);
+        if index % 64 == 0 {
+            std::fs::write(&path, bytes).expect("it can be written");
+            let read = read_npy(&path);
+            assert_eq!(read.is_ok(), result.is_ok());
+        }
+        match result {
+            Ok(picture) => {
+                let Picture {
+                    width,
+                    height,
+                    pixels,
+                } = &picture;
+                assert_eq!(pixels.len() as u64, u64::from(*width) * u64::from(*height));
+                assert!(12 * pixels.len() < bytes.len());
+                true
+            }
+            Err(error) => {
+                let text = error.to_string();
+                assert!(!text.is_empty() && text.len() < 1000, "{text}");
+                assert!(!text.contains(char::is_control), "{text:?}");
+                false
+            }
+        }
+    });
+    assert!(tried.accepted > 0 && tried.refused > 0, "{tried:?}");
+}
+
+// ---- The command line ----
+
+/// The options of `render` alone.
+#[derive(Debug, Parser)]
+struct Render {
+    #[command(flatten)]
+    render: RenderArgs,
+}
+
+/// A scene with members that options meet.
+fn room() -> Scene {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/lecture.toml");
+    load_file(&path).expect("a scene").scene
+}
+
+#[test]
+fn no_words_upset_the_command_line() {
+    let scene = room();
+    let mut seeds: Vec<Vec<u8>> = VALUES
+        .iter()
+        .chain(NUMBERS)
+        .map(|v| v.as_bytes().into())
+        .collect();
+    seeds.push(VALUES.join(" ").into_bytes());
+    let tried = fuzz("words", numbers(5000), &seeds, |index, bytes| {
+        // Damaged values, each after an option.
+        let mut random = Random(index);
+        let text = String::from_utf8_lossy(bytes);
+        let mut arguments = vec!["gpu-trace".to_owned()];
+        for _ in 0..1 + random.below(3) {
+            let option = random.of(OPTIONS);
+            let value = if random.chance(2) {
+                text.as_ref()
+            } else {
+                random.of(VALUES)
+            };
+            let value: String = value.chars().filter(|c| *c != '\0').collect();
+            match random.below(4) {
+                0 => arguments.push(format!("{option}={value}")),
+                1 => arguments.push(value),
+                _ => arguments.extend([(*option).to_owned(), value]),
+            }
+        }
+        if let Err(error) = Cli::try_parse_from(&arguments) {
+            assert!(!error.to_string().is_empty());
+        }
+        let _ = Target::parse(arguments.last().expect("the program's name"));
+        let Ok(parsed) = Render::try_parse_from(&arguments) else {
+            return false;
+        };
+        match parsed.render.settings(&scene) {
+            Ok(settings) => {
+                assert!(!settings.samples.is_empty(), "{settings:?}");
+                assert!(settings.crop.pixels() > 0, "{settings:?}");
+                assert_finite(&Placement::new(&scene, settings.width, settings.height));
+                true
+            }
+            Err(Error::Usage(text)) => {
+                assert!(!text.is_empty());
+                false
+            }
+            Err(other) => panic!("{other}"),
+        }
+    });
+    assert!(tried.accepted > tried.refused / 50, "{tried:?}");
+    assert!(tried.refused > tried.accepted / 50, "{tried:?}");
+}
