@@ -181,3 +181,10 @@ pub(super) fn image_bits(film: &Film) -> Vec<u32> {
     let pixels = film.pixels();
     pixels.as_flattened().iter().map(|x| x.to_bits()).collect()
 }
+
+/// Share of the values of `film` that are off from the reference's by more than 0.1 %.
+pub(super) fn share_off(film: &Film, reference: &Film) -> f64 {
+    let (a, b) = (means(film), means(reference));
+    let near = |(x, y): &(&f64, &f64)| (*x - *y).abs() <= 1.0e-3 * y.abs();
+    1.0 - a.iter().zip(&b).filter(near).count() as f64 / a.len() as f64
+}

@@ -1,7 +1,7 @@
 //! Cases 32 to 37: samples, their sums, and images of any size. Integers and bits: most of the limits
 //! are 0.
 
-use super::context::{Context, SceneText, image_bits, means};
+use super::context::{Context, SceneText, image_bits, means, share_off};
 use super::inputs::Random;
 use super::{Case, Measure, Run};
 use crate::effects::Effects;
@@ -304,7 +304,7 @@ fn sample_indices(context: &Context) -> Result<Measure> {
             seed: later,
             ..settings
         };
-        let share = share_apart(&film, &context.reference(&scene, &shifted)?);
+        let share = share_off(&film, &context.reference(&scene, &shifted)?);
         // A path parts from its twin where a choice falls within a rounding of its threshold: some
         // 1e-5 of the events, of which a pixel has a hundred.
         measure.count(1, u64::from(share > 0.05), || {
@@ -312,16 +312,6 @@ fn sample_indices(context: &Context) -> Result<Measure> {
         });
     }
     Ok(measure)
-}
-
-/// Share of the values that differ by more than a thousandth.
-fn share_apart(a: &Film, b: &Film) -> f64 {
-    let (a, b) = (means(a), means(b));
-    let apart = a
-        .iter()
-        .zip(&b)
-        .filter(|(x, y)| !((*x - *y).abs() <= 1.0e-3 * y.abs()));
-    apart.count() as f64 / a.len() as f64
 }
 
 /// Renders a crop by itself, and counts the values that are not the whole image's.

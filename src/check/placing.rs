@@ -1,7 +1,7 @@
 //! Cases 2, 5 and 10 to 15: where things are. Whole renders; the truth is another render that must
 //! be the same, the f64 reference on the same paths, or a number.
 
-use super::context::{Context, SceneText, image_bits, means};
+use super::context::{Context, SceneText, image_bits, means, share_off};
 use super::{Case, Measure, Run};
 use crate::error::Result;
 use crate::film::Film;
@@ -100,13 +100,6 @@ fn same(measure: &mut Measure, a: &Film, b: &Film, what: &str) {
     let (a, b) = (image_bits(a), image_bits(b));
     let different = a.iter().zip(&b).filter(|(x, y)| x != y).count();
     measure.count(a.len() as u64, different as u64, || what.to_owned());
-}
-
-/// Share of the values of `film` that are off from the reference's by more than 0.1 %.
-fn share_off(film: &Film, reference: &Film) -> f64 {
-    let (a, b) = (means(film), means(reference));
-    let near = |(x, y): &(&f64, &f64)| (*x - *y).abs() <= 1.0e-3 * y.abs();
-    1.0 - a.iter().zip(&b).filter(near).count() as f64 / a.len() as f64
 }
 
 /// The share that may be off: a path that passes within a rounding of a silhouette goes its own way.
