@@ -2,8 +2,12 @@
 
 use std::f64::consts::PI;
 
+use glam::DVec3;
+
 use crate::film::Film;
+use crate::placement::{Placement, Side};
 use crate::scene::{MaterialKind, Scene};
+use crate::settings::{Integrator, Settings};
 
 /// What a film says about the image.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,17 +66,7 @@ pub fn energy_cut_at_most(scene: &Scene, film: &Film) -> Option<f64> {
             .map(|sphere| &scene.materials[sphere.material])
     };
     let albedo = used()
-        .map(|material| match material.kind {
-            MaterialKind::Diffuse { albedo } => albedo.max_element(),
-            MaterialKind::Mirror { reflectance } => reflectance.max_element(),
-            MaterialKind::Dielectric { .. } => 1.0,
-            MaterialKind::Reflective {
-                albedo,
-                specular,
-                epsilon,
-                mu,
-            } => (albedo + specular * (mu * PI * epsilon * (2.0 - epsilon))).max_element(),
-        })
+        .map(|material| albedo(&material.kind).max_element())
         .fold(0.0, f64::max);
     let emitted = used()
         .map(|material| material.emission.max_element())
@@ -85,4 +79,202 @@ pub fn energy_cut_at_most(scene: &Scene, film: &Film) -> Option<f64> {
     let paths = film.samples() as f64 * film.rect().pixels() as f64;
     let removed = tally.cut_throughput / paths * albedo * emitted / (1.0 - albedo);
     Some(removed / estimate.mean)
+}
+
+/// The share of the light that a material reflects, at most.
+fn albedo(kind: &MaterialKind) -> DVec3 {
+    match *kind {
+        MaterialKind::Diffuse { albedo } => albedo,
+        MaterialKind::Mirror { reflectance } => reflectance,
+        MaterialKind::Dielectric { .. } => DVec3::ONE,
+        MaterialKind::Reflective {
+            albedo,
+            specular,
+            epsilon,
+            mu,
+        } => albedo + specular * (mu * PI * epsilon * (2.0 - epsilon)),
+    }
+}
+
+/// What is known of a sample's variance before anything is rendered.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum VarianceClass {
+    /// It is finite, and so is that of its estimate.
+    #[default]
+    Finite,
+    /// It is finite; its estimate from samples may have no finite variance, and is too small as a rule.
+    HeavyTailed,
+    /// It may be infinite: any estimate from samples is without meaning.
+    Infinite,
+}
+
+/// How large a sample can be, and why.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct VarianceReport {
+    /// The class.
+    pub class: VarianceClass,
+    /// What the user should know; `None` where all is well.
+    pub warning: Option<String>,
+}
+
+/// Judges the variance of the estimator that `settings` choose.
+///
+/// The lecture's estimator goes on with the constant probability 1 - p and divides by it, so that the
+/// k-th moment of a path's weight changes at every event by a factor, [`moment_factor`], which may be
+/// more than 1. If the geometric mean of these factors is less than 1 along every path, the k-th
+/// moment of a sample is finite: k = 2 is the variance, k = 4 the variance of its estimate. In a
+/// closed sphere that is necessary too; elsewhere light may get away before it matters, which is not
+/// looked at. Radiance that roulette keeps in bounds has no such trouble.
+#[must_use]
+pub fn variance_class(scene: &Scene, placement: &Placement, settings: &Settings) -> VarianceReport {
+    let Integrator::Lecture { termination } = settings.integrator else {
+        return VarianceReport::default();
+    };
+    [
+        (2, VarianceClass::Infinite),
+        (4, VarianceClass::HeavyTailed),
+    ]
+    .into_iter()
+    .filter(|(k, _)| settings.max_bounces > harmless_bounces(*k, termination))
+    .find_map(|(k, class)| {
+        let cycle = worst_cycle(scene, placement, k, termination)?;
+        (cycle.factor >= 1.0).then(|| VarianceReport {
+            class,
+            warning: Some(cycle.warning(scene, class, k, termination)),
+        })
+    })
+    .unwrap_or_default()
+}
+
+/// The most events of a path whose k-th moment samples still see: with a limit on bounces all moments
+/// are finite on paper, but those of long paths rest on paths that no render meets.
+///
+/// Seeing a mean under another distribution takes about exp(D) samples, D being the divergence of the
+/// two (Chatterjee and Diaconis 2018). The paths on which the k-th moment rests go on at every
+/// event, and their cosines have the density (k + 1) c^k instead of 1: D = ln(k + 1) - k/(k + 1) -
+/// ln(1 - p) an event. No error is estimated from fewer than 64 samples.
+fn harmless_bounces(k: i32, termination: f64) -> u32 {
+    let k = f64::from(k);
+    let divergence = (k + 1.0).ln() - k / (k + 1.0) - (-termination).ln_1p();
+    (64f64.ln() / divergence) as u32
+}
+
+/// The factor by which an event at a material changes the k-th moment of a path's weight in a colour
+/// channel, at most.
+///
+/// For w = 2 c (rho + pi mu S) within the lobe and 2 c rho elsewhere, c uniform on [0, 1], the mean of
+/// w^k is largest if the lobe, a share of at most epsilon of the hemisphere, is where c is largest.
+/// The survivors, 1 - p of all, are divided by 1 - p.
+fn moment_factor(kind: &MaterialKind, channel: usize, k: i32, termination: f64) -> f64 {
+    let kept = 1.0 - termination;
+    let uniform = 2f64.powi(k) / f64::from(k + 1);
+    let moment = match *kind {
+        MaterialKind::Diffuse { albedo } => uniform * albedo[channel].powi(k),
+        // Weights of at most 1, always.
+        MaterialKind::Mirror { .. } | MaterialKind::Dielectric { .. } if termination == 0.0 => 0.0,
+        MaterialKind::Mirror { reflectance } => reflectance[channel].powi(k),
+        MaterialKind::Dielectric { .. } => 1.0,
+        MaterialKind::Reflective {
+            albedo,
+            specular,
+            epsilon,
+            mu,
+        } => {
+            let (low, lobe) = (albedo[channel], PI * mu * specular[channel]);
+            let outside = (1.0 - epsilon).powi(k + 1);
+            uniform * (low.powi(k) * outside + (low + lobe).powi(k) * (1.0 - outside))
+        }
+    };
+    moment / kept.powi(k - 1)
+}
+
+/// Surfaces between which the moments of weights grow most.
+#[derive(Debug)]
+struct Cycle {
+    /// The geometric mean of an event's factor.
+    factor: f64,
+    /// Indices of one or two materials.
+    materials: Vec<usize>,
+    /// The colour channel.
+    channel: usize,
+}
+
+/// The cycle with the largest factor. A sphere that paths are only outside of is not hit twice in a
+/// row: then the two largest factors alternate at best.
+fn worst_cycle(scene: &Scene, placement: &Placement, k: i32, termination: f64) -> Option<Cycle> {
+    let cycle = |channel| {
+        let factors = placement.spheres.iter().map(|sphere| {
+            let kind = &scene.materials[sphere.material].kind;
+            let factor = moment_factor(kind, channel, k, termination);
+            (factor, sphere.material, sphere.side != Side::Outside)
+        });
+        let mut cycles: Vec<Cycle> = Vec::new();
+        let mut largest: [Option<(f64, usize)>; 2] = [None, None];
+        for (factor, material, sees_itself) in factors {
+            if sees_itself {
+                cycles.push(Cycle {
+                    factor,
+                    materials: vec![material],
+                    channel,
+                });
+            }
+            if largest[0].is_none_or(|(f, _)| factor > f) {
+                largest = [Some((factor, material)), largest[0]];
+            } else if largest[1].is_none_or(|(f, _)| factor > f) {
+                largest[1] = Some((factor, material));
+            }
+        }
+        if let [Some((f, a)), Some((g, b))] = largest {
+            let mut materials = vec![a, b];
+            materials.dedup();
+            cycles.push(Cycle {
+                factor: (f * g).sqrt(),
+                materials,
+                channel,
+            });
+        }
+        cycles
+    };
+    (0..3)
+        .flat_map(cycle)
+        .max_by(|a, b| a.factor.total_cmp(&b.factor))
+}
+
+impl Cycle {
+    /// Why, and what to do about it.
+    fn warning(&self, scene: &Scene, class: VarianceClass, k: i32, termination: f64) -> String {
+        let of = |m: &usize| {
+            let material = &scene.materials[*m];
+            let name = material.name.escape_debug();
+            let albedo = albedo(&material.kind)[self.channel];
+            format!("\"{name}\" (albedo {albedo:.3})")
+        };
+        let names: Vec<String> = self.materials.iter().map(of).collect();
+        let between = names.join(" and ");
+        let (says, square) = match class {
+            VarianceClass::Infinite => (
+                "the variance may be infinite, and the error is unknown",
+                "square",
+            ),
+            _ => (
+                "the samples' distribution has a heavy tail, and the estimated error may be too small",
+                "fourth power",
+            ),
+        };
+        // The factor is that without termination over (1 - p)^(k - 1).
+        let kept = (1.0 - termination) * self.factor.powf(1.0 / f64::from(k - 1));
+        let safe = ((1.0 - kept) * 100.0).floor() / 100.0;
+        let lower = if safe >= 0.01 {
+            format!("use --termination {safe:.2} or less, or --integrator bsdf")
+        } else {
+            "no --termination is low enough: use --integrator bsdf".into()
+        };
+        format!(
+            "{says}: with --integrator lecture and a probability of termination of {termination}, \
+             the mean {square} of a path's weight grows by a factor of up to {:.3} at every event \
+             between surfaces of {between}; {lower}",
+            self.factor,
+        )
+    }
 }

@@ -327,7 +327,14 @@ fn the_estimators_agree() {
             0.1,
         ),
     ] {
-        let (picture, stats) = folder.render(&format!("--size 16x16 --spp 256 {options}"));
+        let run = folder.run(&format!(
+            "--size 16x16 --spp 256 {options} -o r.npy --stats r.json"
+        ));
+        // The lecture's estimator has an infinite variance between white walls.
+        let warned = usize::from(integrator == "lecture");
+        assert_eq!(run.code, Some(0), "{run:?}");
+        assert_eq!(run.stderr.matches("warning: ").count(), warned, "{run:?}");
+        let (picture, stats) = (folder.npy("r.npy"), folder.json("r.json"));
         assert_eq!(stats["integrator"], json!(integrator), "{options}");
         assert_eq!(stats["roulette"], json!(roulette), "{options}");
         let effects = stats["effects"].as_array().expect("a list");
@@ -340,6 +347,77 @@ fn the_estimators_agree() {
             (mean / 0.8201 - 1.0).abs() < tolerance,
             "{options}: mean {mean}"
         );
+    }
+}
+
+/// A closed diffuse sphere that emits 1.
+fn furnace(albedo: f64) -> String {
+    format!(
+        "[camera]\nposition = [0.3, 0, 0]\nlook_at = [0, 0, 1]\nfov = 40.0\n[image]\nwidth = 8\n\
+         height = 8\n[material.wall]\ntype = \"diffuse\"\nalbedo = [0.1, {albedo}, 0.1]\n\
+         emission = [1, 1, 1]\n[[sphere]]\ncenter = [0, 0, 0]\nradius = 1.0\nmaterial = \"wall\"\n"
+    )
+}
+
+#[test]
+fn an_infinite_variance_has_no_error() {
+    let folder = Folder::new();
+    let lecture = "--spp 256 --error 90% --integrator lecture";
+    for (albedo, options, advice) in [
+        (0.8, lecture, "use --termination 0.14 or less"),
+        (
+            0.9,
+            lecture,
+            "no --termination is low enough: use --integrator bsdf",
+        ),
+        (
+            0.75,
+            "--spp 256 --error 90% --integrator lecture --termination 0.3 --backend cpu",
+            "use --termination 0.25 or less",
+        ),
+    ] {
+        folder.write("furnace.toml", furnace(albedo));
+        let run = folder.run(&format!(
+            "furnace.toml {options} --progress json -o r.npy --stats r.json"
+        ));
+        assert_eq!(run.code, Some(0), "{run:?}");
+        holds(
+            &run.stdout,
+            &["256 spp, error unknown (infinite variance), "],
+        );
+        let named = format!("\\\"wall\\\" (albedo {albedo:.3})");
+        holds(&run.stderr, &["may be infinite", &named, advice]);
+        assert!(!run.stderr.contains("\"error\":0"), "{run:?}");
+        let stats = folder.json("r.json");
+        assert_eq!(stats["estimated_error"], Value::Null);
+        assert_eq!(stats["variance"], json!("infinite"));
+        assert_eq!(stats["stopped_by"], json!("spp"));
+        let warnings = stats["warnings"].as_array().expect("a list");
+        assert_eq!(warnings.len(), 1, "{stats}");
+    }
+}
+
+#[test]
+fn a_heavy_tail_is_said_and_other_errors_are_known() {
+    let folder = Folder::new();
+    for (albedo, options, class) in [
+        (0.7, "--integrator lecture", "heavy-tailed"),
+        (0.5, "--integrator lecture", "finite"),
+        (0.9, "--integrator bsdf", "finite"),
+        (0.9, "--integrator lecture --max-bounces 3", "finite"),
+    ] {
+        folder.write("furnace.toml", furnace(albedo));
+        let run = folder.run(&format!(
+            "furnace.toml --spp 1024 --error 60% {options} -o r.npy --stats r.json"
+        ));
+        assert_eq!(run.code, Some(0), "{run:?}");
+        let stats = folder.json("r.json");
+        assert_eq!(stats["variance"], json!(class), "{options}");
+        assert!(stats["estimated_error"].is_f64(), "{stats}");
+        assert_eq!(stats["stopped_by"], json!("error"), "{stats}");
+        let warned = usize::from(class != "finite");
+        assert_eq!(run.stderr.matches("heavy tail").count(), warned, "{run:?}");
+        assert_eq!(run.stderr.is_empty(), warned == 0, "{run:?}");
     }
 }
 

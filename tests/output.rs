@@ -726,6 +726,7 @@ fn statistics() -> Stats {
         paths_per_second: f64::NAN,
         rays: 1 << 40,
         estimated_error: None,
+        variance: stats::VarianceClass::HeavyTailed,
         black: false,
         non_finite: 0,
         first_non_finite: None,
@@ -764,6 +765,7 @@ fn statistics_are_valid_json() {
         "paths_per_second",
         "rays",
         "estimated_error",
+        "variance",
         "non_finite",
         "first_non_finite",
         "stopped_by",
@@ -780,6 +782,7 @@ fn statistics_are_valid_json() {
     assert_eq!(json["seed"].as_u64(), Some(u64::MAX));
     assert_eq!(json["sample_range"], serde_json::json!([16, 80]));
     assert_eq!(json["stopped_by"], "interrupt");
+    assert_eq!(json["variance"], "heavy-tailed");
     assert_eq!(json["seconds"]["total"], 2.5);
     for unknown in [
         &json["estimated_error"],

@@ -1,5 +1,433 @@
-//! Cases 29 to 39: the integrator, its sums and its samples.
+//! Cases 29 to 31, 38 and 39: light transport whose outcome is known.
 
-use super::Case;
+use super::context::{Context, SceneText, means};
+use super::film::must;
+use super::{Case, Measure, Run};
+use crate::error::Result;
+use crate::estimate::{VarianceClass, variance_class};
+use crate::film::{BLOCK, Film};
+use crate::placement::Placement;
+use crate::scene::Scene;
+use crate::settings::{Integrator, Settings};
+use crate::statistics::mean_and_error;
 
-pub(super) const CASES: &[Case] = &[];
+pub(super) const CASES: &[Case] = &[
+    Case {
+        id: 29,
+        name: "closed furnaces",
+        setup: "inside a diffuse sphere of albedo 0.5 to 1 and radius 1e-6 to 1e6 that emits 1, no \
+                roulette: the partial sum of the albedo's powers, in units of 2 N u, and no ray misses",
+        run: Run::On(furnaces),
+    },
+    Case {
+        id: 30,
+        name: "roulette",
+        setup: "on and off have the same mean (3.9 standard errors); a path's weight is 0 or in \
+                [1/2, 1]; what loses no light does not die",
+        run: Run::On(roulette),
+    },
+    Case {
+        id: 31,
+        name: "extreme emission, throughput and size",
+        setup: "emission 1e20, radius 1e20 and 1e-20, 10000 bounces without loss, ior 0.1 to 10, \
+                lobes down to 1e-20: no sample that is not finite, and known furnaces hold",
+        run: Run::On(extremes),
+    },
+    Case {
+        id: 38,
+        name: "a light inside a glass ball",
+        setup: "an emitter of n^2 times the environment's radiance in glass, radius 1e-3 to 1e3: it \
+                cannot be seen from outside or inside, in units of 64 u",
+        run: Run::On(light_in_glass),
+    },
+    Case {
+        id: 39,
+        name: "the lecture's variance",
+        setup: "closed furnaces: the blocks' variance is (1 + 2 rho m)/(1 - q) - m^2, q = \
+                4 rho^2/(3 (1 - p)), to 3.9 of its standard errors; infinite where q >= 1",
+        run: Run::On(variance_law),
+    },
+];
+
+/// Unit roundoff of f32.
+const U: f64 = 1.0 / (1 << 24) as f64;
+
+/// The camera in a closed diffuse sphere.
+fn closed(albedo: f64, emission: f64, radius: f64) -> SceneText {
+    let [x, y, z] = [0.3, -0.2, 0.1].map(|x| x * radius);
+    SceneText::new([x, y, z], [z, radius, x])
+        .diffuse("wall", albedo, emission)
+        .sphere([0.0; 3], radius, "wall")
+}
+
+/// Radiance in a closed sphere that emits 1 after at most `bounces` scattering events, by the albedo
+/// that the kernel has.
+fn furnace(albedo: f64, bounces: u32) -> f64 {
+    let albedo = f64::from(albedo as f32);
+    (0..=bounces).rev().fold(0.0, |sum, _| 1.0 + albedo * sum)
+}
+
+/// The error of an f32 sum of it: a rounding an event for the throughput, one for the sum.
+fn furnace_error(bounces: u32) -> f64 {
+    2.0 * f64::from(bounces.max(1)) * U
+}
+
+fn furnaces(context: &Context) -> Result<Measure> {
+    let mut all = vec![(0.5, 1.0e-6), (0.9, 1.0), (0.999, 1.0e6), (1.0, 1.0)];
+    if !context.options.quick {
+        let radii = [1.0e-6, 1.0e-3, 1.0, 7.0, 1.0e3, 1.0e6];
+        let of_radius = |r| [0.5, 0.9, 0.999, 1.0].map(|albedo| (albedo, r));
+        all = radii.into_iter().flat_map(of_radius).collect();
+    }
+    let mut measure = Measure::new(1.0, "of 2 N u");
+    for (albedo, radius) in all {
+        let scene = closed(albedo, 1.0, radius).load(context)?;
+        let settings = Settings {
+            roulette: false,
+            ..context.settings(&scene, 8, 8)
+        };
+        let film = context.render(&scene, &settings)?;
+        let bounces = settings.max_bounces;
+        let truth = furnace(albedo, bounces) * context.disturbed(1.0e-3);
+        for mean in means(&film) {
+            measure.add((mean / truth - 1.0).abs() / furnace_error(bounces), || {
+                format!("albedo {albedo}, radius {radius:e}: {mean} for {truth}")
+            });
+        }
+        // Every path goes on to the limit.
+        let paths = settings.crop.pixels() as u64 * film.samples();
+        let (rays, wanted) = (film.tally().rays, paths * u64::from(bounces + 1));
+        must(&mut measure, rays == wanted, || {
+            format!("albedo {albedo}, radius {radius:e}: {rays} rays instead of {wanted}")
+        });
+    }
+    Ok(measure)
+}
+
+/// A gray scene where roulette matters: glass and a lamp over a dark floor.
+fn gray(context: &Context) -> Result<Scene> {
+    SceneText::new([0.0, 0.0, 4.0], [0.0, 0.0, 0.0])
+        .environment(0.5)
+        .diffuse("floor", 0.4, 0.0)
+        .diffuse("lamp", 0.3, 2.0)
+        .dielectric("glass", 1.5)
+        .sphere([0.0, -1001.0, 0.0], 1000.0, "floor")
+        .sphere([0.7, -0.5, 0.0], 0.5, "lamp")
+        .sphere([-0.5, -0.4, 0.3], 0.6, "glass")
+        .load(context)
+}
+
+fn roulette(context: &Context) -> Result<Measure> {
+    let mut measure = Measure::new(3.9, "standard errors");
+    for scene in [closed(0.5, 1.0, 1.0).load(context)?, gray(context)?] {
+        let on = Settings {
+            ..context.settings(&scene, 32, context.size(64, 1024))
+        };
+        // Other samples, so that the two are independent.
+        let off = Settings {
+            roulette: false,
+            seed: 1,
+            ..on.clone()
+        };
+        let (on, off) = (context.render(&scene, &on)?, context.render(&scene, &off)?);
+        let factor = context.disturbed(0.1);
+        let differences: Vec<f64> = (0..on.rect().pixels())
+            .map(|i| factor * on.mean(i)[0] - off.mean(i)[0])
+            .collect();
+        let (mean, error) = mean_and_error(&differences);
+        measure.add((mean / error).abs(), || {
+            format!("{:?}: {mean:.2e} +- {error:.1e} apart", first_kind(&scene))
+        });
+    }
+    for albedo in context.size(&[0.3, 0.8][..], &[0.1, 0.3, 0.5, 0.8, 0.95][..]) {
+        weights(context, *albedo, &mut measure)?;
+    }
+    lossless(context, &mut measure)?;
+    Ok(measure)
+}
+
+/// What tells the scenes of this file apart.
+fn first_kind(scene: &Scene) -> &str {
+    scene.materials.first().map_or("", |m| m.name.as_str())
+}
+
+/// A black lamp of radiance 1 in a dark closed sphere: one sample is the weight with which its path
+/// came to the lamp, or 0. Roulette ends a path of weight w below 1/2 with 1 - 2 w, else makes it 1/2.
+fn weights(context: &Context, albedo: f64, measure: &mut Measure) -> Result<()> {
+    let scene = SceneText::new([0.8, 0.0, 0.0], [0.0, 0.8, 0.3])
+        .diffuse("wall", albedo, 0.0)
+        .diffuse("lamp", 0.0, 1.0)
+        .sphere([0.0; 3], 1.0, "wall")
+        .sphere([0.0; 3], 0.4, "lamp")
+        .load(context)?;
+    let film = context.render(&scene, &context.settings(&scene, 64, 1))?;
+    let least = 0.5 * context.disturbed(0.5);
+    // The product of the albedos and one division: less than a hundred roundings.
+    let slack = 100.0 * U;
+    let values = means(&film);
+    for w in &values {
+        let allowed = *w == 0.0 || (least * (1.0 - slack)..=1.0).contains(w);
+        must(measure, allowed, || format!("albedo {albedo}: weight {w}"));
+    }
+    let seen = values.iter().any(|w| *w > 0.0);
+    must(measure, seen, || {
+        format!("albedo {albedo}: no path arrives")
+    });
+    Ok(())
+}
+
+/// A closed sphere that reflects everything: every path goes on to the limit.
+fn lossless(context: &Context, measure: &mut Measure) -> Result<()> {
+    let scene = closed(context.disturbed(-0.01), 1.0, 1.0).load(context)?;
+    let settings = Settings {
+        max_bounces: 200,
+        ..context.settings(&scene, 8, 8)
+    };
+    let film = context.render(&scene, &settings)?;
+    let (rays, wanted) = (film.tally().rays, 64 * 8 * 201);
+    must(measure, rays == wanted, || {
+        format!("lossless: {rays} rays instead of {wanted}")
+    });
+    Ok(())
+}
+
+/// Counts samples that are not finite, and pixels that are not, or not what is known.
+fn sound(film: &Film, known: Option<(f64, f64)>, name: &str, measure: &mut Measure) {
+    let tally = film.tally();
+    let samples = film.samples() * film.rect().pixels() as u64;
+    let wrong = |mean: &f64| {
+        let off = known.map_or(0.0, |(truth, error)| (mean / truth - 1.0).abs() - error);
+        !(mean.is_finite() && *mean >= 0.0 && off <= 0.0)
+    };
+    let values = means(film);
+    let failures = values.iter().filter(|m| wrong(m)).count() as u64;
+    let dark = values.iter().all(|m| *m == 0.0);
+    measure.count(samples, tally.non_finite, || {
+        format!("{name}: first {:?}", tally.first_non_finite)
+    });
+    measure.count(values.len() as u64, failures + u64::from(dark), || {
+        let shown = values.iter().find(|m| wrong(m));
+        format!("{name}: a pixel is {shown:?}, known {known:?}")
+    });
+}
+
+fn extremes(context: &Context) -> Result<Measure> {
+    let mut measure = Measure::new(0.0, "samples or values");
+    let mut known = vec![
+        ("emission 1e20, 10000 bounces", 1.0, 1.0e20, 1.0, 10_000),
+        ("radius 1e20", 0.5, 1.0, 1.0e20, 64),
+        ("radius 1e-20", 0.5, 1.0, 1.0e-20, 64),
+    ];
+    if !context.options.quick {
+        known.extend([
+            ("emission 1e-20", 0.999, 1.0e-20, 1.0, 64),
+            ("emission 1e20 in radius 1e20", 0.999, 1.0e20, 1.0e20, 64),
+            ("emission 1e20 in radius 1e-20", 0.999, 1.0e20, 1.0e-20, 64),
+        ]);
+    }
+    for (name, albedo, emission, radius, bounces) in known {
+        let scene = closed(albedo, emission, radius).load(context)?;
+        let settings = Settings {
+            max_bounces: bounces,
+            roulette: false,
+            ..context.settings(&scene, 2, 4)
+        };
+        let film = context.render(&scene, &settings)?;
+        let truth = context.disturbed(0.1) * furnace(albedo, bounces) * emission;
+        // Emission has a rounding of its own.
+        let error = furnace_error(bounces) + U;
+        sound(&film, Some((truth, error)), name, &mut measure);
+    }
+    for (name, scene) in zoos(context)? {
+        let film = context.render(&scene, &context.settings(&scene, 16, 8))?;
+        sound(&film, None, name, &mut measure);
+    }
+    Ok(measure)
+}
+
+/// Spheres of extreme materials around a lamp of 1e20, in an environment of 1e20. f64 has no digits
+/// for a camera beside a ball of radius 1e20: that is for furnaces, and here the ground has 1e12.
+fn zoos(context: &Context) -> Result<Vec<(&'static str, Scene)>> {
+    let base = || {
+        SceneText::new([0.0, 0.0, 4.0], [0.0, 0.0, 0.0])
+            .environment(1.0e20)
+            .diffuse("lamp", 1.0, 1.0e20)
+            .sphere([0.0, 1.2, 0.0], 0.5, "lamp")
+    };
+    // The disturbance: a lobe that makes 1e20 times 1e20 of the light.
+    let mu = if context.options.disturb {
+        1.0e20
+    } else {
+        1.0e19
+    };
+    let epsilon = if context.options.disturb {
+        1.0e-2
+    } else {
+        1.0e-20
+    };
+    let lobe = |epsilon: f64, mu: f64| {
+        format!(
+            "type = \"reflective\"\nalbedo = [0.3, 0.3, 0.3]\nspecular = [1, 1, 1]\n\
+             epsilon = {epsilon:?}\nmu = {mu:?}"
+        )
+    };
+    let reflective = base()
+        .material("needle", &lobe(epsilon, mu))
+        .material("narrow", &lobe(1.0e-7, 1.0e6))
+        .material("wide", &lobe(1.0, 0.2))
+        .sphere([-0.8, 0.0, 0.0], 0.5, "needle")
+        .sphere([0.8, 0.0, 0.0], 0.5, "narrow")
+        .sphere([0.0, -1.0 - 1.0e12, 0.0], 1.0e12, "wide")
+        .load(context)?;
+    let glass = base()
+        .dielectric("dense", 10.0)
+        .dielectric("thin", 0.1)
+        .dielectric("above", 1.0001)
+        .dielectric("below", 0.9999)
+        .dielectric("none", 1.0)
+        .sphere([-0.8, 0.0, 0.0], 0.5, "dense")
+        .sphere([0.8, 0.0, 0.0], 0.5, "thin")
+        .sphere([0.0, 0.0, 0.5], 0.3, "above")
+        .sphere([0.0, -0.8, 0.0], 0.3, "below")
+        .sphere([0.0, 0.0, 2.0], 0.1, "none")
+        .load(context)?;
+    Ok(vec![("reflective", reflective), ("glass", glass)])
+}
+
+/// A ball of glass in an environment of 1, a black lamp in it, the camera on the axis.
+fn lamp_in_glass(radius: f64, ior: f64, camera: f64, emission: f64) -> SceneText {
+    let at = |z: f64| [0.0, 0.0, z * radius];
+    SceneText::new(at(camera), at(-9.0))
+        .environment(1.0)
+        .dielectric("glass", ior)
+        .diffuse("lamp", 0.0, emission)
+        .sphere([0.0; 3], radius, "glass")
+        .sphere(at(-0.5), 0.2 * radius, "lamp")
+}
+
+fn light_in_glass(context: &Context) -> Result<Measure> {
+    const OUTSIDE: f64 = 4.0;
+    // From here the wall is never beyond the critical angle, up to an index of 3.
+    const INSIDE: f64 = 0.3;
+    let mut all = vec![
+        (1.0, 1.5, OUTSIDE),
+        (1.0e-3, 2.4, OUTSIDE),
+        (1.0e3, 1.33, INSIDE),
+    ];
+    if !context.options.quick {
+        let of_radius = |r: f64| {
+            let of_ior = move |n: f64| [(r, n, OUTSIDE), (r, n, INSIDE)];
+            [0.7, 1.0001, 1.5, 2.4].into_iter().flat_map(of_ior)
+        };
+        all = [1.0e-3, 1.0, 1.0e3]
+            .into_iter()
+            .flat_map(of_radius)
+            .collect();
+    }
+    let mut measure = Measure::new(1.0, "of 64 u");
+    for (radius, ior, camera) in all {
+        let square = ior * ior;
+        let emission = square * context.disturbed(0.1);
+        let scene = lamp_in_glass(radius, ior, camera, emission).load(context)?;
+        let settings = Settings {
+            // Grazing paths are in the glass for long.
+            max_bounces: 1000,
+            ..context.settings(&scene, 16, 64)
+        };
+        let film = context.render(&scene, &settings)?;
+        let truth = if camera == INSIDE { square } else { 1.0 };
+        // The surface is crossed at most twice, with weights of 1 between: each time two divisions
+        // (5 u), two products and the error of a rounded index twice, 20 u; then the emission, and
+        // the sums of a block.
+        for mean in means(&film) {
+            measure.add((mean / truth - 1.0).abs() / (64.0 * U), || {
+                format!("radius {radius:e}, ior {ior}, camera at {camera}: {mean} for {truth}")
+            });
+        }
+    }
+    Ok(measure)
+}
+
+/// Raw moments, first to fourth, of the lecture's estimator in a closed sphere that emits 1.
+///
+/// A sample is L = 1 + w L' with L' of the same distribution and independent of w, which is 0 with
+/// probability p and else 2 rho c/(1 - p), c uniform on [0, 1]: E w^k = q_k =
+/// (2 rho)^k/((k + 1) (1 - p)^(k - 1)). Expanding E (1 + w L')^k gives E L^k by the lower ones.
+fn lecture_moments(rho: f64, p: f64) -> [f64; 4] {
+    let q = |k: i32| (2.0 * rho).powi(k) / (f64::from(k + 1) * (1.0 - p).powi(k - 1));
+    let (q1, q2, q3, q4) = (q(1), q(2), q(3), q(4));
+    let m1 = 1.0 / (1.0 - q1);
+    let m2 = (1.0 + 2.0 * q1 * m1) / (1.0 - q2);
+    let m3 = (1.0 + 3.0 * q1 * m1 + 3.0 * q2 * m2) / (1.0 - q3);
+    let m4 = (1.0 + 4.0 * q1 * m1 + 6.0 * q2 * m2 + 4.0 * q3 * m3) / (1.0 - q4);
+    [m1, m2, m3, m4]
+}
+
+fn variance_law(context: &Context) -> Result<Measure> {
+    // All have finite sixth moments: the variance of the sample variance is finite, and so is its
+    // third moment, which makes it normal for many samples.
+    let mut all = vec![(0.3, 0.2), (0.55, 0.2)];
+    if !context.options.quick {
+        all.extend([(0.45, 0.2), (0.55, 0.1), (0.6, 0.0), (0.4, 0.4)]);
+    }
+    let mut measure = Measure::new(3.9, "standard errors");
+    for (rho, p) in all {
+        let scene = closed(rho, 1.0, 1.0).load(context)?;
+        let settings = Settings {
+            integrator: Integrator::Lecture { termination: p },
+            ..context.settings(&scene, 64, context.size(64, 512))
+        };
+        let film = context.render(&scene, &settings)?;
+        let [m1, m2, m3, m4] = lecture_moments(rho, p);
+        let truth = m2 - m1 * m1;
+        let fourth = m4 - 4.0 * m1 * m3 + 6.0 * m1 * m1 * m2 - 3.0 * m1.powi(4);
+        let excess = fourth / (truth * truth) - 3.0;
+        let (measured, blocks) = sample_variance(&film);
+        // The variance of b block sums varies by 2/(b - 1) + their excess kurtosis over b, and that
+        // of the sum of 4 samples is a quarter of a sample's; over all pixels.
+        let error = truth
+            * ((2.0 / (blocks - 1.0) + excess / BLOCK as f64 / blocks)
+                / film.rect().pixels() as f64)
+                .sqrt();
+        let wanted = truth * context.disturbed(0.2);
+        measure.add((measured - wanted).abs() / error, || {
+            format!("rho {rho}, p {p}: {measured:.5} for {wanted:.5} +- {error:.5}")
+        });
+    }
+    classes(context, &mut measure)?;
+    Ok(measure)
+}
+
+/// The variance of a sample by the blocks' spread, averaged over the pixels; and the blocks a pixel.
+fn sample_variance(film: &Film) -> (f64, f64) {
+    let (pixels, samples) = (film.rect().pixels(), film.samples() as f64);
+    let sum: f64 = (0..pixels)
+        .map(|i| film.variance_of_mean(i).map_or(f64::NAN, |v| v[0]))
+        .sum();
+    (sum * samples / pixels as f64, samples / BLOCK as f64)
+}
+
+/// Where no variance can be measured the program says so: q_2 >= 1; and q_4 >= 1, where the variance
+/// of the measured variance is infinite.
+fn classes(context: &Context, measure: &mut Measure) -> Result<()> {
+    use VarianceClass::{Finite, HeavyTailed, Infinite};
+    let steps = [
+        (0.62, Finite),
+        (0.64, HeavyTailed),
+        (0.77, HeavyTailed),
+        (0.78, Infinite),
+    ];
+    for (rho, wanted) in steps {
+        let scene = closed(context.disturbed(0.2) * rho, 1.0, 1.0).load(context)?;
+        let settings = Settings {
+            integrator: Integrator::Lecture { termination: 0.2 },
+            ..context.settings(&scene, 1, 1)
+        };
+        let placement = Placement::with_offset(&scene, 1, 1, settings.offset);
+        let class = variance_class(&scene, &placement, &settings).class;
+        must(measure, class == wanted, || {
+            format!("rho {rho}: {class:?} instead of {wanted:?}")
+        });
+    }
+    Ok(())
+}

@@ -8,11 +8,15 @@
 mod context;
 mod driver;
 mod exits;
+mod film;
+mod furnaces;
 mod inputs;
 mod integrator;
 mod intersection;
+mod lights;
 mod materials;
 mod placing;
+mod sampling;
 
 pub use context::Context;
 pub use driver::{DriverReport, probe_driver};
@@ -58,11 +62,15 @@ pub enum Run {
 /// All cases, by number.
 #[must_use]
 pub fn cases() -> Vec<Case> {
-    let groups: [&[Case]; 4] = [
+    let groups: [&[Case]; 8] = [
         intersection::CASES,
         placing::CASES,
+        lights::CASES,
         materials::CASES,
+        furnaces::CASES,
+        sampling::CASES,
         integrator::CASES,
+        film::CASES,
     ];
     let mut all = groups.concat();
     all.sort_by_key(|case| case.id);

@@ -9,7 +9,7 @@ use super::signals::Signals;
 use super::{derive, print};
 use crate::effects::Effects;
 use crate::error::{Error, Result};
-use crate::estimate::energy_cut_at_most;
+use crate::estimate::{VarianceClass, VarianceReport, energy_cut_at_most, variance_class};
 use crate::film::NonFinite;
 use crate::gpu::device::{self, DRIVER_ADVICE, DeviceChoice, Gpu};
 use crate::gpu::renderer::GpuRenderer;
@@ -31,6 +31,7 @@ struct Job {
     settings: Settings,
     placement: Placement,
     effects: Effects,
+    variance: VarianceReport,
     targets: Vec<Target>,
 }
 
@@ -42,6 +43,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
     let progress = Progress::new(args.progress_mode(), args.quiet);
     let bare = |warning: &String| warning.trim_start_matches("warning: ").to_owned();
     let mut warnings: Vec<String> = job.loaded.warnings.iter().map(bare).collect();
+    warnings.extend(job.variance.warning.clone());
     let opening = Instant::now();
     let gpu = open(args, &mut warnings)?;
     let opened = opening.elapsed();
@@ -72,8 +74,8 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
     }
     let said = warnings.len();
 
-    let mut watch = Display::new(&progress, &signals, &job.settings);
-    let outcome = render(renderer.as_mut(), &job.settings, &mut watch);
+    let mut watch = Display::new(&progress, &signals, &job);
+    let outcome = render_job(renderer.as_mut(), &job, &mut watch);
     progress.finish();
 
     warnings.extend(observations(&outcome, &job.settings));
@@ -177,13 +179,29 @@ fn prepare(args: &RenderArgs) -> Result<Job> {
     check_all(&outputs, args.scene_file().as_slice())?;
     check_memory(&settings.crop, PIXEL_BYTES)?;
     let (placement, effects) = derive(&loaded.scene, &settings)?;
+    let variance = variance_class(&loaded.scene, &placement, &settings);
     Ok(Job {
         loaded,
         settings,
         placement,
         effects,
+        variance,
         targets,
     })
+}
+
+/// Renders. Where the variance is infinite no estimate of the error counts, for the stop rule neither.
+fn render_job(renderer: &mut dyn Renderer, job: &Job, watch: &mut dyn Watch) -> Outcome {
+    if job.variance.class != VarianceClass::Infinite {
+        return render(renderer, &job.settings, watch);
+    }
+    let settings = Settings {
+        error: None,
+        ..job.settings.clone()
+    };
+    let mut outcome = render(renderer, &settings, watch);
+    outcome.estimate.error = None;
+    outcome
 }
 
 /// Bytes of memory that a pixel takes: 48 each in film and window, and room for the files.
@@ -311,6 +329,7 @@ fn statistics(job: &Job, outcome: &Outcome, backend: &str, device: Device) -> St
         paths_per_second: samples as f64 / outcome.elapsed.as_secs_f64(),
         rays: tally.rays,
         estimated_error: outcome.estimate.error,
+        variance: job.variance.class,
         black: outcome.estimate.is_black(),
         non_finite: tally.non_finite,
         first_non_finite: tally.first_non_finite,
@@ -359,6 +378,9 @@ fn summary(job: &Job, stats: &Stats) -> String {
     let error = match stats.estimated_error {
         Some(error) => format!("error {}", percent(error)),
         None if stats.black => "black".into(),
+        None if stats.variance == VarianceClass::Infinite => {
+            "error unknown (infinite variance)".into()
+        }
         None => "error unknown below 64 spp".into(),
     };
     let stopped = match stats.stopped_by {
@@ -434,13 +456,16 @@ struct Display<'a> {
     spp: Option<u64>,
     time: Option<Duration>,
     error: Option<f64>,
+    /// Whether an error can be estimated at all.
+    estimable: bool,
     /// Where the current stretch of speed measurement began.
     mark: (Duration, u64),
     rate: f64,
 }
 
 impl<'a> Display<'a> {
-    fn new(progress: &'a Progress, signals: &'a Signals, settings: &Settings) -> Self {
+    fn new(progress: &'a Progress, signals: &'a Signals, job: &Job) -> Self {
+        let settings = &job.settings;
         Self {
             progress,
             signals,
@@ -449,6 +474,7 @@ impl<'a> Display<'a> {
             spp: Some(settings.samples.end - settings.samples.start).filter(|n| *n != MAXIMUM_SPP),
             time: settings.time,
             error: settings.error,
+            estimable: job.variance.class != VarianceClass::Infinite,
             mark: (Duration::ZERO, 0),
             rate: 0.0,
         }
@@ -464,12 +490,13 @@ impl Watch for Display<'_> {
             self.mark = (status.elapsed, status.paths);
         }
         let elapsed = status.elapsed.as_secs_f64();
+        let error = status.error.filter(|_| self.estimable);
         // The nearest of the stop rules; an error falls with the root of the samples.
         let by_spp = status.paths as f64 / status.total as f64;
         let by_time = self.time.map_or(0.0, |time| elapsed / time.as_secs_f64());
         let by_error = self
             .error
-            .zip(status.error)
+            .zip(error)
             .map_or(0.0, |(want, have)| (want / have).powi(2));
         let fraction = by_spp.max(by_time).max(by_error).min(1.0);
         let remaining = (fraction > 0.0).then(|| elapsed * (1.0 / fraction - 1.0));
@@ -481,7 +508,7 @@ impl Watch for Display<'_> {
             elapsed: status.elapsed,
             remaining: remaining.and_then(|s| Duration::try_from_secs_f64(s).ok()),
             paths_per_second: self.rate,
-            error: status.error,
+            error,
         });
     }
 

@@ -7,6 +7,7 @@ use serde::Serialize;
 
 use super::{Metadata, atomic};
 use crate::error::{Error, Result};
+pub use crate::estimate::VarianceClass;
 pub use crate::film::NonFinite;
 pub use crate::render::StoppedBy;
 
@@ -56,6 +57,9 @@ pub struct Stats {
     pub rays: u64,
     /// The relative error, a fraction; `null` where unknown.
     pub estimated_error: Option<f64>,
+    /// Whether the variance, and with it the error, is one that samples can show: `finite`,
+    /// `heavy-tailed`, or `infinite`, where the error is unknown.
+    pub variance: VarianceClass,
     /// Whether no light at all was found, which leaves the error without meaning.
     pub black: bool,
     /// Samples that were not finite; they are in no sum.

@@ -1,6 +1,6 @@
 //! `cargo xtask bench`: the benchmarks, as ratios of things that run side by side.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use crate::{cargo, program, run};
@@ -15,19 +15,22 @@ Usage: cargo xtask bench [TABLE...]
   resources  time to the first window, peak memory
   peers      Mitsuba 3 on the same scene (installs it into target/peers with pip;
              needs LLVM 19, as of Debian's libllvm19, for its compiled variant)
+  hazards    how exact the kernel, a plain one and Mitsuba 3 are on scenes that are hard in f32
+             (installs as peers does; writes docs/images/hazards.png; takes ten minutes)
 
-Without a name: all but peers. Run it on an idle machine.
+Without a name: all but peers and hazards. Run it on an idle machine.
 ";
 
 /// Runs the benchmarks named in `tables`.
 pub(crate) fn all(tables: &[String]) -> Result<(), String> {
-    const KNOWN: [&str; 6] = [
+    const KNOWN: [&str; 7] = [
         "naive",
         "unused",
         "geometry",
         "offsets",
         "resources",
         "peers",
+        "hazards",
     ];
     if tables.iter().any(|t| t == "--help" || t == "-h") {
         print!("{USAGE}");
@@ -54,6 +57,9 @@ pub(crate) fn all(tables: &[String]) -> Result<(), String> {
     }
     if tables.iter().any(|t| t == "peers") {
         peers()?;
+    }
+    if tables.iter().any(|t| t == "hazards") {
+        hazards()?;
     }
     Ok(())
 }
@@ -108,8 +114,8 @@ fn peak_memory(command: &mut Command) -> Option<u64> {
     peak
 }
 
-/// Installs Mitsuba into an environment of its own and takes turns with it.
-fn peers() -> Result<(), String> {
+/// The Python of an environment with Mitsuba, installed if it is not there.
+fn python() -> Result<PathBuf, String> {
     let environment = Path::new("target/peers");
     let python = environment.join("bin/python");
     if !python.exists() {
@@ -124,9 +130,30 @@ fn peers() -> Result<(), String> {
         "--quiet",
         "mitsuba==3.9.1",
         "numpy",
+        "pillow",
     ]))?;
-    run(Command::new(&python)
+    Ok(python)
+}
+
+/// Takes turns with Mitsuba.
+fn peers() -> Result<(), String> {
+    run(Command::new(python()?)
         .arg("benches/peers/side_by_side.py")
         .arg(program("release"))
         .env("NODEVICE_SELECT", "1"))
+}
+
+/// Renders the hazard scenes with everything and compares.
+fn hazards() -> Result<(), String> {
+    let python = python()?;
+    // Absolute: cargo runs a benchmark in its package's folder.
+    let folder = std::path::absolute("target/hazards").map_err(|e| e.to_string())?;
+    run(cargo()
+        .args(["bench", "--bench", "hazards", "--"])
+        .arg(&folder)
+        .env("NODEVICE_SELECT", "1"))?;
+    run(Command::new(python)
+        .arg("benches/hazards/compare.py")
+        .arg(&folder)
+        .args(["--panel", "docs/images/hazards.png"]))
 }

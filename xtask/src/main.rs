@@ -1,7 +1,8 @@
-//! Tasks of the project: `cargo xtask test`, `cargo xtask bench`, `cargo xtask soak`.
+//! Tasks of the project: `cargo xtask test`, `cargo xtask bench` and others.
 
 mod bench;
 mod drivers;
+mod numerics;
 mod soak;
 mod test;
 
@@ -15,6 +16,7 @@ Usage: cargo xtask TASK
            every driver that is there (--help for its options)
   bench    run the benchmarks side by side and print their table (--help for its options)
   soak     render for 30 minutes, or as many as are named, and fail if memory grows
+  numerics run `gpu-trace check` on every driver that is there, into the table of docs/numerics.md
 ";
 
 fn main() -> ExitCode {
@@ -23,6 +25,7 @@ fn main() -> ExitCode {
     let rest: Vec<String> = arguments.collect();
     let done = match task.as_deref() {
         Some("test") => test::all(&rest),
+        Some("numerics") => numerics::all(),
         Some("bench") => bench::all(&rest),
         Some("soak") => soak::all(&rest),
         Some("help" | "--help" | "-h") => {

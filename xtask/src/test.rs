@@ -23,9 +23,8 @@ Further arguments choose tests: the same on every driver.
 /// Tests that open no GPU: once is enough. All other files of `tests/` run on every driver.
 const WITHOUT_GPU: [&str; 3] = ["effects", "output", "scene"];
 
-/// What the program is asked on every driver after the tests: each must exit with 0. The place for a
-/// check that the program makes of its own driver.
-const COMMANDS: [&[&str]; 1] = [&["devices"]];
+/// What the program is asked on every driver after the tests: each must exit with 0.
+const COMMANDS: [&[&str]; 2] = [&["devices"], &["check", "--quick"]];
 
 /// What a driver has come to.
 struct Part {
