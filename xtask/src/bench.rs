@@ -1,6 +1,6 @@
 //! `cargo xtask bench`: the benchmarks, as ratios of things that run side by side.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use crate::{cargo, program, run};
