@@ -281,6 +281,14 @@ fn observations(outcome: &Outcome, settings: &Settings) -> Vec<String> {
     if outcome.film.samples() > 0 && outcome.estimate.is_black() {
         said.push("the image is black: no path has found any light".to_owned());
     }
+    let pixels = outcome.film.pixels();
+    let beyond = pixels.iter().flatten().filter(|x| x.is_infinite()).count();
+    if beyond > 0 {
+        said.push(format!(
+            "{beyond} values are beyond {:.1e}, the largest of f32: they are infinite in the files",
+            f32::MAX
+        ));
+    }
     let asked = settings
         .error
         .filter(|_| outcome.stopped_by != StoppedBy::Error);
@@ -381,7 +389,8 @@ fn summary(job: &Job, stats: &Stats) -> String {
         None if stats.variance == VarianceClass::Infinite => {
             "error unknown (infinite variance)".into()
         }
-        None => "error unknown below 64 spp".into(),
+        None if stats.spp < 64 => "error unknown below 64 spp".into(),
+        None => "error unknown".into(),
     };
     let stopped = match stats.stopped_by {
         StoppedBy::Spp => "",
