@@ -112,10 +112,10 @@ fn the_driver_keeps_what_the_kernel_needs() {
 #[test]
 fn the_command_reports_and_exits() {
     let folder = Folder::new();
-    let text = folder.ok("check --quick --case 4 --case grazing");
+    let text = folder.ok("check --quick --case 4 --case shells");
     holds(
         &text,
-        &["tiny sphere", "grazing", "2 passed, 0 failed", "arithmetic"],
+        &["tiny sphere", "thin glass", "2 passed, 0 failed", "arithmetic"],
     );
     let last = text.lines().last().unwrap_or_default();
     holds(last, &[&gpu().summary.name, &gpu().summary.driver]);
