@@ -16,7 +16,7 @@ pub use error::{Bias, Errors};
 pub use flip::{DEFAULT_PPD, flip};
 pub use heat::{HeatMap, colour as heat_colour};
 pub use ssim::ssim;
-pub use ztest::{ZTest, ztest};
+pub use ztest::{Known, ZTest, ztest};
 
 use crate::error::{Error, Result};
 use crate::input::Input;
