@@ -119,7 +119,6 @@ fn encoding(info: &Info<'_>, notes: &mut Vec<String>) -> io::Result<Encoding> {
         notes.push("its primaries are not those of sRGB: compared channel by channel".into());
     }
     match info.gama_chunk.map(|gamma| f64::from(gamma.into_value())) {
-        Some(0.0) => Err(invalid("its gAMA chunk holds 0")),
         Some(1.0) => Ok(Encoding::Linear),
         Some(gamma) => Ok(Encoding::Power(gamma.recip())),
         None => {

@@ -116,8 +116,8 @@ fn z_rows(test: &ZTest, row: &mut impl FnMut(&str, String, String)) {
         Known::Reference => "; A is taken as exact",
     };
     let worst = format!(
-        "worst, at {x},{y}; {} of all pixels beyond {:.2}{against}",
-        test.beyond, test.limit
+        "worst, at {x},{y}; pixels beyond {:.2}: {}{against}",
+        test.limit, test.beyond
     );
     row("z-test", format!("{:.2}", test.worst), worst);
     let limit = format!("pooled, of at most {:.2}", test.pooled_limit);
@@ -151,10 +151,35 @@ fn significant(number: f64) -> String {
     if !number.is_finite() {
         return number.to_string();
     }
-    let size = number.abs();
-    if !(1.0e-4..1.0e5).contains(&size) {
-        return format!("{number:.2e}");
+    // Rounded first: 0.9999 has the exponent of 1.
+    let rounded = format!("{number:.2e}");
+    match rounded.split_once('e').map(|(_, e)| e.parse::<i32>()) {
+        Some(Ok(exponent @ -4..5)) => {
+            let decimals = (2 - exponent).max(0) as usize;
+            format!("{number:.decimals$}")
+        }
+        _ => rounded,
     }
-    let decimals = (2.0 - size.log10().floor()).clamp(0.0, 6.0) as usize;
-    format!("{number:.decimals$}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::significant;
+
+    #[test]
+    fn numbers_have_three_digits() {
+        for (number, text) in [
+            (0.0, "0"),
+            (-0.0, "0"),
+            (0.99996, "1.00"),
+            (-0.012345, "-0.0123"),
+            (12.345, "12.3"),
+            (99_999.0, "1.00e5"),
+            (12_345.0, "12345"),
+            (0.000_012, "1.20e-5"),
+            (f64::INFINITY, "inf"),
+        ] {
+            assert_eq!(significant(number), text);
+        }
+    }
 }
