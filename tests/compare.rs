@@ -450,6 +450,17 @@ fn what_cannot_be_compared_is_refused() {
 }
 
 #[test]
+fn formats_that_cannot_hold_the_image_are_noted() {
+    let folder = folder();
+    let bright = Picture::new(16, 12, vec![[2.0, 0.4, 0.3]; 192]);
+    folder.write("bright.npy", npy::encode(&bright));
+    let note = "PNG holds nothing above 1, where 100 % of the other's pixels are";
+    holds(&folder.ok("compare b.png bright.npy"), &[note]);
+    holds(&folder.ok("compare bright.npy b.png"), &[note]);
+    assert!(!folder.ok("compare b.png b.npy").contains("note:"));
+}
+
+#[test]
 fn the_json_says_the_same() {
     let folder = folder();
     let run = folder.run("compare a.exr b.exr --json --tolerance 0.5% --heat-map map.png");

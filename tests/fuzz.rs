@@ -879,6 +879,9 @@ fn images() -> Vec<Vec<u8>> {
         Compression::PIZ,
         Compression::PXR24,
         Compression::B44,
+        Compression::B44A,
+        Compression::ZIP1,
+        Compression::DWAA(None),
     ] {
         for blocks in [Blocks::ScanLines, Blocks::Tiles(Vec2(2, 2))] {
             let channel = |name| AnyChannel::new(name, FlatSamples::F16(vec![f16::ONE; 15]));

@@ -24,9 +24,9 @@ Examples:
   gpu-trace compare a.exr b.exr --metric z                       exit 3 if noise cannot explain it
   gpu-trace compare a.exr b.exr --heat-map where.png             where the errors are
 
-relRMSE is sqrt of the mean over pixels and channels of (a - b)^2/(b^2 + (0.1 M)^2), with the mean M of B.
-All measures but FLIP and SSIM are of linear values: PNG files are decoded by what they say of their
-encoding, sRGB if nothing.";
+relRMSE is sqrt of the mean over pixels and channels of (a - b)^2/(b^2 + (0.1 M)^2), where M is the
+mean of B. All measures but FLIP and SSIM are of linear values: PNG files are decoded by what they
+say of their encoding, sRGB if nothing.";
 
 /// The options of `compare`.
 #[derive(Clone, Debug, Args)]
@@ -100,8 +100,10 @@ struct Verdict {
 /// Runs `compare`.
 pub(super) fn run(args: &CompareArgs) -> Result<()> {
     let target = args.check()?;
-    let (image, reference) = (read(&args.image)?, read(&args.reference)?);
+    let (mut image, mut reference) = (read(&args.image)?, read(&args.reference)?);
     check_same(&image, &reference, args.any_scene)?;
+    note_range(&mut image, &reference);
+    note_range(&mut reference, &image);
     let options = Options {
         exposure: args.exposure,
         pixels_per_degree: args.ppd,
@@ -140,6 +142,20 @@ pub(super) fn run(args: &CompareArgs) -> Result<()> {
     match verdict {
         Some(verdict) if !verdict.passed => Err(Error::Check(verdict.text)),
         _ => Ok(()),
+    }
+}
+
+/// Notes where a file could not hold what the other does: that is an error of the format.
+fn note_range(input: &mut Input, other: &Input) {
+    let pixels = &other.picture.pixels;
+    let bright = pixels.iter().filter(|p| p.iter().any(|v| *v > 1.0)).count();
+    if input.format == Format::Png && bright > 0 {
+        let share = bright as f64 / pixels.len() as f64;
+        let text = format!(
+            "PNG holds nothing above 1, where {} of the other's pixels are",
+            percent(share)
+        );
+        input.notes.push(text);
     }
 }
 
