@@ -127,6 +127,28 @@ fn exr_of_every_lossless_compression_and_both_layouts() {
 }
 
 #[test]
+fn exr_of_lossy_compressions() {
+    // Halves pass PXR24 whole. The others' errors are below the step from row to row, 1/8.
+    for (compression, error) in [
+        (Compression::PXR24, 0.0),
+        (Compression::B44, 0.05),
+        (Compression::B44A, 0.05),
+        (Compression::DWAA(None), 0.05),
+        (Compression::DWAB(None), 0.05),
+    ] {
+        let encoding = Encoding_ {
+            compression,
+            blocks: Blocks::ScanLines,
+            line_order: LineOrder::Increasing,
+        };
+        let read = read(&file(vec![layer("", &["R", "G", "B"], true, encoding)])).picture;
+        for (a, b) in std::iter::zip(read.pixels.as_flattened(), picture().pixels.as_flattened()) {
+            assert!((a - b).abs() <= error, "{compression:?}: {a} {b}");
+        }
+    }
+}
+
+#[test]
 fn exr_of_this_program_says_what_it_shows() {
     let stderr: Vec<[f32; 3]> = picture()
         .pixels
