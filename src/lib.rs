@@ -16,18 +16,21 @@
 //! 9. [`film`]: f64 sums and variances over all windows.
 //! 10. [`estimate`]: mean and error.
 //! 11. [`output`]: images, statistics, progress.
+//! 12. [`input`] and [`compare`](mod@compare): images of any origin, and how far two are apart.
 //!
 //! [`check`] measures the hard cases of all this on a device, with the tests of [`statistics`].
 //! [`error`] is what can go wrong anywhere.
 
 pub mod check;
 pub mod cli;
+pub mod compare;
 pub mod containment;
 pub mod effects;
 pub mod error;
 pub mod estimate;
 pub mod film;
 pub mod gpu;
+pub mod input;
 pub mod media;
 pub mod output;
 pub mod placement;

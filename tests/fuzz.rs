@@ -7,6 +7,7 @@
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use std::fmt::Debug;
+use std::io::Cursor;
 use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
@@ -14,13 +15,18 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+use ::exr::prelude::{
+    AnyChannel, AnyChannels, Blocks, Compression, Encoding, FlatSamples, Image, LayerAttributes,
+    LineOrder, Vec2, WritableImage as _, f16,
+};
 use clap::Parser;
 use glam::DVec3;
 use gpu_trace::cli::{Cli, RenderArgs};
 use gpu_trace::effects::Effects;
 use gpu_trace::error::Error;
+use gpu_trace::input::decode;
 use gpu_trace::media::MAX_LEVELS;
-use gpu_trace::output::{Picture, Target, npy, read_npy};
+use gpu_trace::output::{Layer, Metadata, Picture, Target, exr, npy, png, read_npy};
 use gpu_trace::placement::{PlacedCamera, Placement};
 use gpu_trace::scene::load::{Loaded, load_file, load_str};
 use gpu_trace::scene::{Scene, summary};
@@ -842,6 +848,76 @@ fn no_bytes_upset_the_npy_reader() {
             Err(error) => {
                 let text = error.to_string();
                 assert!(!text.is_empty() && text.len() < 1000, "{text}");
+                assert!(!text.contains(char::is_control), "{text:?}");
+                false
+            }
+        }
+    });
+    assert!(tried.accepted > 0 && tried.refused > 0, "{tried:?}");
+}
+
+// ---- Images ----
+
+/// Small files of every kind, as other programs write them.
+fn images() -> Vec<Vec<u8>> {
+    let picture = Picture::new(5, 3, vec![[0.5, 0.25, 2.0]; 15]);
+    let metadata = Metadata::new().with("scene", "a").with("scene_hash", "0");
+    let values = [0.5; 45];
+    let stderr = [Layer {
+        name: "stderr",
+        channels: &["R", "G", "B"],
+        values: &values,
+    }];
+    let mut files = vec![
+        npy::encode(&picture),
+        png::encode(&picture, 0.0, &metadata).expect("a PNG file"),
+        exr::encode(&picture, &stderr, &metadata).expect("an EXR file"),
+    ];
+    for compression in [
+        Compression::Uncompressed,
+        Compression::RLE,
+        Compression::PIZ,
+        Compression::PXR24,
+        Compression::B44,
+        Compression::B44A,
+        Compression::ZIP1,
+        Compression::DWAA(None),
+    ] {
+        for blocks in [Blocks::ScanLines, Blocks::Tiles(Vec2(2, 2))] {
+            let channel = |name| AnyChannel::new(name, FlatSamples::F16(vec![f16::ONE; 15]));
+            let layer = ::exr::prelude::Layer::new(
+                Vec2(5, 3),
+                LayerAttributes::named("a"),
+                Encoding {
+                    compression,
+                    blocks,
+                    line_order: LineOrder::Increasing,
+                },
+                AnyChannels::sort(["R", "G", "B"].map(channel).into_iter().collect()),
+            );
+            let mut bytes = Cursor::new(Vec::new());
+            let image = Image::from_layer(layer);
+            image.write().to_buffered(&mut bytes).expect("an EXR file");
+            files.push(bytes.into_inner());
+        }
+    }
+    files
+}
+
+#[test]
+fn no_bytes_upset_the_image_readers() {
+    let seeds = images();
+    assert!(seeds.iter().all(|bytes| decode(bytes).is_ok()));
+    let tried = fuzz("images", numbers(20_000), &seeds, |_, bytes| {
+        match decode(bytes) {
+            Ok(input) => {
+                let size = input.picture.width as usize * input.picture.height as usize;
+                assert_eq!(input.picture.pixels.len(), size);
+                true
+            }
+            Err(error) => {
+                let text = error.to_string();
+                assert!(!text.is_empty() && text.len() < 2000, "{text}");
                 assert!(!text.contains(char::is_control), "{text:?}");
                 false
             }

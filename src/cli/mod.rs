@@ -2,6 +2,7 @@
 
 mod args;
 mod check;
+mod compare;
 mod devices;
 mod effects;
 mod fault;
@@ -33,6 +34,7 @@ Examples:
   gpu-trace my.toml --error 1% --time 2m       until the error is 1 % or two minutes are over
   gpu-trace effects my.toml                    what the kernel will hold, and why
   gpu-trace check --quick                      does this adapter stand the hard cases?
+  gpu-trace compare a.exr b.exr --tolerance 1% is image a within 1 % of reference b?
 
 Exit codes: 0 done; 1 failed; 2 wrong usage or a bad scene; 3 a check failed; 129, 130 or 143 ended
 by a signal, with what there was written.";
@@ -70,6 +72,9 @@ enum Command {
     },
     /// Measure the hard numerical cases on this adapter against f64; exit 3 if any fails.
     Check(Box<args::CheckArgs>),
+    /// Compare an image with a reference: errors, bias, FLIP, SSIM; exit 3 beyond a tolerance.
+    #[command(after_help = compare::AFTER_HELP)]
+    Compare(compare::CompareArgs),
     /// List the adapters, with driver and limits.
     Devices {
         /// Print JSON.
@@ -152,6 +157,7 @@ fn run(cli: Cli) -> Result<()> {
         Some(Command::Render(args)) => render::run(&args),
         Some(Command::Effects { render, json }) => effects::run(&render, json),
         Some(Command::Check(args)) => check::run(&args),
+        Some(Command::Compare(args)) => compare::run(&args),
         Some(Command::Devices { json }) => devices::run(json),
         Some(Command::Scene(SceneCommand::Check { scene })) => scene::check(&scene),
         Some(Command::Scene(SceneCommand::Schema)) => scene::schema(),

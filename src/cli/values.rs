@@ -36,6 +36,36 @@ pub(super) fn error(text: &str) -> Result<f64, String> {
     Ok(value)
 }
 
+/// `1%` or `0.01`: a fraction of 0 or more. Numbers above 1 need the sign, or percent were meant.
+pub(super) fn tolerance(text: &str) -> Result<f64, String> {
+    let (number, scale) = match text.strip_suffix('%') {
+        Some(number) => (number.trim_end(), 0.01),
+        None => (text, 1.0),
+    };
+    let value = number
+        .parse::<f64>()
+        .map_err(|_| "not a number; try 1% or 0.01")?
+        * scale;
+    if !(value.is_finite() && value >= 0.0) {
+        return Err("a tolerance is 0 or more; try 1% or 0.01".into());
+    }
+    if scale == 1.0 && value > 1.0 {
+        return Err(format!(
+            "{} % is very much; for {text} % write {text}%",
+            value * 100.0
+        ));
+    }
+    Ok(value)
+}
+
+/// Pixels per degree of visual angle.
+pub(super) fn pixels_per_degree(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(ppd) if (1.0..=1000.0).contains(&ppd) => Ok(ppd),
+        _ => Err("a number from 1 to 1000, as in 67".into()),
+    }
+}
+
 /// `30s`, `2m`, `1h 30m`, or a number of seconds.
 pub(super) fn time(text: &str) -> Result<Duration, String> {
     let form = "try 30s, 2m, or a number of seconds";
@@ -154,6 +184,17 @@ mod tests {
     fn percent_is_suggested_where_it_was_meant() {
         assert!(error("2").is_err_and(|text| text.contains("for 2 % write 2%")));
         assert!(error("200%").is_err_and(|text| !text.contains("write")));
+    }
+
+    #[test]
+    fn tolerances_may_be_none_or_large() {
+        assert_eq!(tolerance("1%"), Ok(0.01));
+        assert_eq!(tolerance("0"), Ok(0.0));
+        assert_eq!(tolerance("150 %"), Ok(1.5));
+        assert!(tolerance("2").is_err_and(|text| text.contains("write 2%")));
+        for wrong in ["", "%", "-1%", "nan", "inf", "1e400", "much"] {
+            assert!(tolerance(wrong).is_err(), "{wrong}");
+        }
     }
 
     #[test]

@@ -98,7 +98,7 @@ pub fn encode(picture: &Picture, layers: &[Layer<'_>], metadata: &Metadata) -> i
 }
 
 /// What readers assume where a file does not say so.
-const REC_709: Chromaticities = Chromaticities {
+pub(crate) const REC_709: Chromaticities = Chromaticities {
     red: Vec2(0.64, 0.33),
     green: Vec2(0.30, 0.60),
     blue: Vec2(0.15, 0.06),

@@ -8,7 +8,7 @@ use std::path::Path;
 use super::Picture;
 use crate::error::{Error, Result};
 
-const MAGIC: &[u8; 6] = b"\x93NUMPY";
+pub(crate) const MAGIC: &[u8; 6] = b"\x93NUMPY";
 
 /// Headers are padded to a multiple of this, so that the data can be mapped into memory.
 const ALIGNMENT: usize = 64;
@@ -70,30 +70,32 @@ pub fn read_npy(path: &Path) -> Result<Picture> {
 /// # Errors
 /// What the source reports, or [`io::ErrorKind::InvalidData`] with what is wrong.
 pub fn decode(mut source: impl Read) -> io::Result<Picture> {
-    let Header {
-        width,
-        height,
-        value_bytes,
-    } = Header::read(&mut source)?;
-    // Sizes whose product overflows saturate, which is more than any source holds.
-    let pixel_bytes = 3 * u64::from(value_bytes);
-    let data_bytes = (u64::from(width) * u64::from(height)).saturating_mul(pixel_bytes);
-    let mut data = Vec::new();
-    // One byte more than expected, to see whether the file goes on. The vector grows with what is
-    // there.
-    source
-        .take(data_bytes.saturating_add(1))
-        .read_to_end(&mut data)?;
-    if data.len() as u64 != data_bytes {
-        let fault = if (data.len() as u64) < data_bytes {
-            "ends early"
-        } else {
-            "goes on"
-        };
-        return Err(invalid(format!(
-            "the data {fault}: {height} rows of {width} pixels take {data_bytes} bytes"
-        )));
+    let header = Header::read(&mut source)?;
+    let value_bytes = match header.descr() {
+        Some("<f4") => 4,
+        Some("<f8") => 8,
+        _ => {
+            return Err(invalid(format!(
+                "values of type {}; wanted '<f4' or '<f8'",
+                shown(&header.descr)
+            )));
+        }
+    };
+    if header.fortran_order {
+        return Err(invalid(
+            "the array is in Fortran order; save numpy.ascontiguousarray(array)",
+        ));
     }
+    let (width, height) = match header.sizes()[..] {
+        [height, width, 3] if height > 0 && width > 0 => (width, height),
+        _ => {
+            return Err(invalid(format!(
+                "an array of shape {}; wanted (height, width, 3), none of them 0",
+                shown(&header.shape)
+            )));
+        }
+    };
+    let data = read_data(source, width, height, 3 * value_bytes)?;
     let values: Vec<f32> = match value_bytes {
         4 => data
             .as_chunks()
@@ -111,16 +113,54 @@ pub fn decode(mut source: impl Read) -> io::Result<Picture> {
     Ok(Picture::new(width, height, values.as_chunks().0.to_vec()))
 }
 
-/// What the header says, once found acceptable.
-struct Header {
+/// The bytes after the header, which are those of the array and no more. Takes no more memory than
+/// the source has bytes.
+///
+/// # Errors
+/// What the source reports, or [`io::ErrorKind::InvalidData`] if there are fewer or more.
+pub(crate) fn read_data(
+    source: impl Read,
     width: u32,
     height: u32,
-    /// 4 or 8.
-    value_bytes: u8,
+    pixel_bytes: u64,
+) -> io::Result<Vec<u8>> {
+    // Sizes whose product overflows saturate, which is more than any source holds.
+    let data_bytes = (u64::from(width) * u64::from(height)).saturating_mul(pixel_bytes);
+    let mut data = Vec::new();
+    // One byte more than expected, to see whether the file goes on. The vector grows with what is
+    // there.
+    source
+        .take(data_bytes.saturating_add(1))
+        .read_to_end(&mut data)?;
+    if data.len() as u64 == data_bytes {
+        return Ok(data);
+    }
+    let fault = if (data.len() as u64) < data_bytes {
+        "ends early"
+    } else {
+        "goes on"
+    };
+    Err(invalid(format!(
+        "the data {fault}: {height} rows of {width} pixels take {data_bytes} bytes"
+    )))
+}
+
+/// What the header says of the array; whether that is acceptable is the caller's question.
+pub(crate) struct Header {
+    /// The literal of the type, as in `'<f4'`, quotes and all.
+    pub(crate) descr: String,
+    /// Whether the first index runs fastest.
+    pub(crate) fortran_order: bool,
+    /// The literal of the shape, as in `(480, 640, 3)`.
+    pub(crate) shape: String,
 }
 
 impl Header {
-    fn read(source: &mut impl Read) -> io::Result<Self> {
+    /// Reads up to the data.
+    ///
+    /// # Errors
+    /// What the source reports, or [`io::ErrorKind::InvalidData`] if this is no header of an array.
+    pub(crate) fn read(source: &mut impl Read) -> io::Result<Self> {
         let magic: [u8; 6] = read_array(source)?;
         if magic != *MAGIC {
             return Err(invalid("this is not an NPY file"));
@@ -179,50 +219,39 @@ impl Header {
             return Err(malformed(header));
         };
 
-        let value_bytes = match quoted(descr) {
-            Some(("<f4", "")) => 4,
-            Some(("<f8", "")) => 8,
-            _ => {
-                return Err(invalid(format!(
-                    "values of type {}; wanted '<f4' or '<f8'",
-                    shown(descr)
-                )));
-            }
-        };
-        match fortran_order {
-            "False" => {}
-            "True" => {
-                return Err(invalid(
-                    "the array is in Fortran order; save numpy.ascontiguousarray(array)",
-                ));
-            }
+        let fortran_order = match fortran_order {
+            "False" => false,
+            "True" => true,
             _ => return Err(malformed(header)),
-        }
-        let [height, width] = rows_and_columns(shape).ok_or_else(|| {
-            invalid(format!(
-                "an array of shape {}; wanted (height, width, 3), none of them 0",
-                shown(shape)
-            ))
-        })?;
+        };
         Ok(Self {
-            width,
-            height,
-            value_bytes,
+            descr: descr.to_owned(),
+            fortran_order,
+            shape: shape.to_owned(),
         })
     }
-}
 
-/// Height and width if `shape` is the literal of a tuple (height, width, 3).
-fn rows_and_columns(shape: &str) -> Option<[u32; 2]> {
-    let inner = shape.strip_prefix('(')?.strip_suffix(')')?.trim();
-    let inner = inner.strip_suffix(',').unwrap_or(inner);
-    let sizes: Option<Vec<u32>> = inner
-        .split(',')
-        .map(|size| size.trim().parse().ok())
-        .collect();
-    match sizes?[..] {
-        [height, width, 3] if height > 0 && width > 0 => Some([height, width]),
-        _ => None,
+    /// The type's name if it is a plain one, as in `<f4`.
+    pub(crate) fn descr(&self) -> Option<&str> {
+        quoted(&self.descr)
+            .filter(|(_, rest)| rest.is_empty())
+            .map(|(name, _)| name)
+    }
+
+    /// The array's sizes; empty if the shape is no tuple of them.
+    pub(crate) fn sizes(&self) -> Vec<u32> {
+        let inner = self
+            .shape
+            .strip_prefix('(')
+            .and_then(|rest| rest.strip_suffix(')'))
+            .unwrap_or_default()
+            .trim();
+        let inner = inner.strip_suffix(',').unwrap_or(inner);
+        let sizes: Option<Vec<u32>> = inner
+            .split(',')
+            .map(|size| size.trim().parse().ok())
+            .collect();
+        sizes.unwrap_or_default()
     }
 }
 
@@ -272,7 +301,7 @@ fn malformed(header: &str) -> io::Error {
 
 /// A part of the header as a message may show it: what is corrupt can be long and hold control
 /// characters.
-fn shown(text: &str) -> String {
+pub(crate) fn shown(text: &str) -> String {
     let visible = |c: char| match c {
         '\'' | '"' => vec![c],
         _ => c.escape_debug().collect(),
@@ -280,6 +309,6 @@ fn shown(text: &str) -> String {
     text.trim().chars().take(80).flat_map(visible).collect()
 }
 
-fn invalid(text: impl Into<String>) -> io::Error {
+pub(crate) fn invalid(text: impl Into<String>) -> io::Error {
     io::Error::new(io::ErrorKind::InvalidData, text.into())
 }

@@ -26,6 +26,18 @@ pub struct Target {
     pub format: Format,
 }
 
+impl Format {
+    /// As people call it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Png => "PNG",
+            Self::Exr => "EXR",
+            Self::Npy => "NPY",
+        }
+    }
+}
+
 impl Target {
     /// Reads the format off the extension, in upper or lower case. Touches no file.
     ///

@@ -1,0 +1,155 @@
+//! Images of any origin: EXR, NPY and PNG, told apart by their first bytes, as linear RGB.
+//!
+//! What a file cannot say, or says in a way that could be read as two things, is refused or noted;
+//! nothing is guessed in silence.
+
+mod exr;
+mod npy;
+mod png;
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+
+pub use self::png::linear;
+
+use crate::error::{Error, Result};
+use crate::output::{Format, Picture};
+
+/// An image and what its file says about it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Input {
+    /// As it was typed; empty if it came from no file.
+    pub path: PathBuf,
+    /// What kind of file it was.
+    pub format: Format,
+    /// How the file holds its values; `picture` is linear in any case.
+    pub encoding: Encoding,
+    /// The image. May hold values that are not finite.
+    pub picture: Picture,
+    /// The standard error of each value of the picture, from the layer `stderr` of an EXR file.
+    pub stderr: Option<Picture>,
+    /// What files of this program say about themselves: `scene`, `scene_hash`, `spp`, ...
+    pub about: BTreeMap<String, String>,
+    /// What the user should know of how the file was read.
+    pub notes: Vec<String>,
+}
+
+/// How a file holds its values.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Encoding {
+    /// Proportional to radiance.
+    Linear,
+    /// The transfer function of sRGB.
+    Srgb,
+    /// A power: linear values are the file's to this exponent, as in 2.2.
+    Power(f64),
+}
+
+impl fmt::Display for Encoding {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Linear => formatter.write_str("linear"),
+            Self::Srgb => formatter.write_str("sRGB"),
+            Self::Power(exponent) => write!(formatter, "gamma {exponent:.2}"),
+        }
+    }
+}
+
+impl Input {
+    fn new(format: Format, encoding: Encoding, picture: Picture) -> Self {
+        Self {
+            path: PathBuf::new(),
+            format,
+            encoding,
+            picture,
+            stderr: None,
+            about: BTreeMap::new(),
+            notes: Vec::new(),
+        }
+    }
+}
+
+/// The first bytes of a PNG file.
+const PNG: &[u8] = b"\x89PNG\r\n\x1a\n";
+/// The first bytes of an EXR file.
+const EXR: &[u8] = &[0x76, 0x2f, 0x31, 0x01];
+/// The first bytes of an NPY file.
+const NPY: &[u8] = crate::output::npy::MAGIC;
+
+/// Reads an image file. Its first bytes say what it is, whatever its extension.
+///
+/// # Errors
+/// [`Error::File`] if it cannot be read, is none of the three kinds, is corrupt, or holds something
+/// that is no single image in RGB or grey.
+pub fn read(path: &Path) -> Result<Input> {
+    File::open(path)
+        .and_then(read_all)
+        .and_then(|bytes| decode(&bytes))
+        .map(|input| Input {
+            path: path.to_path_buf(),
+            ..input
+        })
+        .map_err(|source| Error::File {
+            action: "cannot read",
+            path: path.to_path_buf(),
+            source,
+        })
+}
+
+/// All bytes, if the first few are those of an image: anything else may have no end.
+fn read_all(mut file: File) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    (&mut file).take(PNG.len() as u64).read_to_end(&mut bytes)?;
+    kind(&bytes)?;
+    file.read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
+
+/// As [`read`], from the bytes of a file.
+///
+/// # Errors
+/// [`io::ErrorKind::InvalidData`] with what is wrong.
+pub fn decode(bytes: &[u8]) -> io::Result<Input> {
+    match kind(bytes)? {
+        Format::Png => png::decode(bytes),
+        Format::Exr => exr::decode(bytes),
+        Format::Npy => npy::decode(bytes),
+    }
+}
+
+fn kind(bytes: &[u8]) -> io::Result<Format> {
+    [(PNG, Format::Png), (EXR, Format::Exr), (NPY, Format::Npy)]
+        .into_iter()
+        .find(|(magic, _)| bytes.starts_with(magic))
+        .map(|(_, format)| format)
+        .ok_or_else(|| invalid("this is neither an EXR, nor a PNG, nor an NPY file"))
+}
+
+/// Memory that any file may ask for, in bytes of its pixels.
+const PIXEL_BYTES: u64 = 16 << 20;
+
+/// Refuses a size that `bytes` cannot hold, before memory is taken for it: `pixel_bytes` for each
+/// pixel, packed by a factor of `ratio` at most.
+fn check_size(
+    width: u64,
+    height: u64,
+    pixel_bytes: u64,
+    ratio: u64,
+    bytes: usize,
+) -> io::Result<()> {
+    let most = PIXEL_BYTES.max((bytes as u64).saturating_mul(ratio));
+    let wanted = width.saturating_mul(height).saturating_mul(pixel_bytes);
+    if wanted <= most && u32::try_from(width).is_ok() && u32::try_from(height).is_ok() {
+        return Ok(());
+    }
+    Err(invalid(format!(
+        "its header promises {width}x{height} pixels, more than its {bytes} bytes can hold"
+    )))
+}
+
+fn invalid(text: impl Into<String>) -> io::Error {
+    io::Error::new(io::ErrorKind::InvalidData, text.into())
+}
