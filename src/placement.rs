@@ -9,6 +9,7 @@
 use glam::DVec3;
 
 use crate::containment::{containers, reachable};
+use crate::lights::Lights;
 use crate::media::{Media, Medium};
 use crate::scene::{Handedness, MaterialKind, Scene};
 use crate::settings::Offset;
@@ -33,6 +34,8 @@ pub struct Placement {
     pub camera: PlacedCamera,
     /// How paths leave surfaces, distances in kernel units.
     pub offset: Offset,
+    /// What light sampling chooses from.
+    pub lights: Lights,
 }
 
 /// A sphere in kernel units, relative to the placement's origin.
@@ -188,7 +191,7 @@ impl Placement {
         let within = within.collect();
         let poles = spheres.iter().filter(|s| s.pole.is_some()).count();
         let camera = place_camera(scene, forward, approach, scale, width, height);
-        Self {
+        let mut placement = Self {
             scale,
             light: light(scene, &order),
             spheres,
@@ -197,7 +200,10 @@ impl Placement {
             within,
             camera,
             offset: offset.scaled(scale),
-        }
+            lights: Lights::default(),
+        };
+        placement.lights = Lights::new(scene, &placement);
+        placement
     }
 }
 

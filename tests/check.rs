@@ -115,7 +115,12 @@ fn the_command_reports_and_exits() {
     let text = folder.ok("check --quick --case 4 --case shells");
     holds(
         &text,
-        &["tiny sphere", "thin glass", "2 passed, 0 failed", "arithmetic"],
+        &[
+            "tiny sphere",
+            "thin glass",
+            "2 passed, 0 failed",
+            "arithmetic",
+        ],
     );
     let last = text.lines().last().unwrap_or_default();
     holds(last, &[&gpu().summary.name, &gpu().summary.driver]);

@@ -4,7 +4,7 @@ use wgpu::util::DeviceExt as _;
 
 use crate::effects::Effects;
 use crate::error::{Error, Result};
-use crate::gpu::layout::{MaterialRecord, PoleRecord, SphereRecord};
+use crate::gpu::layout::{LightRecord, MaterialRecord, PoleRecord, SphereRecord};
 use crate::placement::Placement;
 use crate::scene::Scene;
 use crate::shader::Kernel;
@@ -21,6 +21,13 @@ impl Uploads {
         effects: &Effects,
     ) -> Self {
         let mut all: Vec<(u32, &'static str, Vec<u8>)> = Vec::new();
+        if effects.has("lights") {
+            let lights = placement.lights.table.iter();
+            let records: Vec<LightRecord> = lights
+                .map(|light| LightRecord::new(light, scene, placement))
+                .collect();
+            all.push((14, "lights", bytemuck::cast_slice(&records).to_vec()));
+        }
         if effects.has("baked") {
             return Self(all);
         }
