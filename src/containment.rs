@@ -8,22 +8,26 @@ use crate::media::precedes;
 use crate::placement::Side;
 use crate::scene::{MaterialKind, Scene};
 
-/// Opaque spheres, the largest first, that are looked at as containers: walls and shells are few
-/// and large, and a scene of millions must not take the square of its size.
+/// Opaque spheres of either side that are looked at as containers: walls and shells are few and large,
+/// and a scene of millions must not take the square of its size.
 const CONTAINERS: usize = 64;
 
 /// Rounding of the sum of a distance and a radius in f64, as a share of it.
-const ROUNDING: f64 = 4.0 * f64::EPSILON;
+pub const ROUNDING: f64 = 4.0 * f64::EPSILON;
 
-/// A gap below this share of the outer radius is one that f32 may get wrong.
+/// The most spheres just within one and the same dielectric, none within another of them.
+pub const MOST_CORES: usize = 4;
+
+/// A sphere lies just within another if their surfaces are nowhere farther apart than this share of the
+/// outer radius: f32 may get the order of such surfaces wrong.
 const CLOSE: f64 = 1.0 / 1024.0;
 
 /// Which spheres can be reached by a path at all: not those that equal another one, nor those that
 /// an opaque surface hides from the side on which the camera is.
 ///
-/// Of equal spheres the first stays, of equal dielectrics the one of higher precedence.
+/// `coincident` gets each sphere that equals another one, with that. Of equal spheres the first stays, of equal dielectrics the one of higher precedence.
 #[must_use]
-pub fn reachable(scene: &Scene, sides: &[Side]) -> Vec<bool> {
+pub fn reachable(scene: &Scene, sides: &[Side], coincident: &mut Vec<[usize; 2]>) -> Vec<bool> {
     let mut reachable = vec![true; scene.spheres.len()];
     let mut places: HashMap<[u64; 4], usize> = HashMap::new();
     for (i, sphere) in scene.spheres.iter().enumerate() {
@@ -40,26 +44,37 @@ pub fn reachable(scene: &Scene, sides: &[Side]) -> Vec<bool> {
         }
         if is_dielectric(scene, i) && is_dielectric(scene, first) && precedes(scene, i, first) {
             reachable[first] = false;
+            coincident.push([first, i]);
             places.insert(key.map(|x| (x + 0.0).to_bits()), i);
         } else {
             reachable[i] = false;
+            coincident.push([i, first]);
         }
     }
-    let mut walls: Vec<usize> = (0..scene.spheres.len())
-        .filter(|i| reachable[*i] && matches!(sides[*i], Side::Outside | Side::Inside))
-        .collect();
-    walls.sort_by(|a, b| {
-        scene.spheres[*b]
-            .radius
-            .total_cmp(&scene.spheres[*a].radius)
-    });
-    walls.truncate(CONTAINERS);
-    for (i, reachable) in reachable.iter_mut().enumerate() {
-        *reachable &= !walls
-            .iter()
-            .any(|w| *w != i && hides(scene, *w, sides[*w], i));
+    for wall in walls(scene, sides) {
+        // A hidden wall hides nothing that what hides it does not: so nothing hides its hider.
+        if !reachable[wall] {
+            continue;
+        }
+        for (i, reachable) in reachable.iter_mut().enumerate() {
+            *reachable &= i == wall || !hides(scene, wall, sides[wall], i);
+        }
     }
     reachable
+}
+
+/// Opaque spheres that may hide others, those first that may hide each other: rooms around the camera,
+/// the tightest first, then others, the largest first.
+fn walls(scene: &Scene, sides: &[Side]) -> Vec<usize> {
+    let radius = |i: &usize| scene.spheres[*i].radius;
+    let on = |side: Side| (0..sides.len()).filter(move |i| sides[*i] == side);
+    let mut rooms: Vec<usize> = on(Side::Inside).collect();
+    let mut solids: Vec<usize> = on(Side::Outside).collect();
+    rooms.sort_by(|a, b| radius(a).total_cmp(&radius(b)));
+    solids.sort_by(|a, b| radius(b).total_cmp(&radius(a)));
+    rooms.truncate(CONTAINERS);
+    solids.truncate(CONTAINERS);
+    rooms.into_iter().chain(solids).collect()
 }
 
 /// Whether the opaque sphere `wall`, of which paths are on `side`, hides all of sphere `i`.
@@ -78,7 +93,8 @@ fn hides(scene: &Scene, wall: usize, side: Side, i: usize) -> bool {
     }
 }
 
-/// For each sphere the dielectric that it lies just within, if there is one: the tightest.
+/// For each sphere the dielectric that it lies just within, if there is one: the tightest. A dielectric
+/// has at most [`MOST_CORES`] of them.
 #[must_use]
 pub fn containers(scene: &Scene, sides: &[Side], reachable: &[bool]) -> Vec<Option<usize>> {
     let mut containers = vec![None; scene.spheres.len()];
@@ -89,30 +105,41 @@ pub fn containers(scene: &Scene, sides: &[Side], reachable: &[bool]) -> Vec<Opti
         if sides[outer] != Side::Tracked {
             continue;
         }
-        // A sphere just within another has nearly its radius: their centres are close.
+        // Their centres are close.
         let reach = CLOSE * scene.spheres[outer].radius;
         let from = order.partition_point(|i| x(*i) < x(outer) - reach);
         let near = order[from..]
             .iter()
             .take_while(|i| x(**i) <= x(outer) + reach);
         for &inner in near.filter(|i| **i != outer && sides[**i] != Side::Sign) {
-            let is_in = gap(scene, outer, inner)
-                .is_some_and(|gap| gap <= CLOSE * scene.spheres[outer].radius);
+            let is_in = just_within(scene, outer, inner);
             let tighter = |known: usize| scene.spheres[outer].radius < scene.spheres[known].radius;
             if is_in && containers[inner].is_none_or(tighter) {
                 containers[inner] = Some(outer);
             }
         }
     }
+    // The order of surfaces is kept for all of a container's spheres or, if it is too crowded for the
+    // kernel, for none: half of it would let paths out that cannot come back.
+    let mut counts: HashMap<usize, usize> = HashMap::new();
+    for container in containers.iter().flatten() {
+        *counts.entry(*container).or_default() += 1;
+    }
+    for container in &mut containers {
+        *container = container.filter(|c| counts[c] <= MOST_CORES);
+    }
     containers
 }
 
-/// The least distance between the surfaces, if `inner` lies within `outer`.
-fn gap(scene: &Scene, outer: usize, inner: usize) -> Option<f64> {
+/// Whether `inner` lies within `outer`, and their surfaces are close all around.
+fn just_within(scene: &Scene, outer: usize, inner: usize) -> bool {
     let (outer, inner) = (&scene.spheres[outer], &scene.spheres[inner]);
-    let gap = outer.radius - inner.radius - outer.center.distance(inner.center);
+    let distance = outer.center.distance(inner.center);
+    let difference = outer.radius - inner.radius;
     let rounding = ROUNDING * outer.radius;
-    (inner.radius < outer.radius && gap >= -rounding).then_some(gap)
+    difference > 0.0
+        && difference - distance >= -rounding
+        && difference + distance <= CLOSE * outer.radius
 }
 
 fn is_dielectric(scene: &Scene, i: usize) -> bool {

@@ -182,7 +182,7 @@ impl Effects {
                 name: "environment",
                 what: "constant light from everywhere",
                 reasons: match scene.environment {
-                    Some(e) if e.max_element() > 0.0 => {
+                    Some(e) if e.max_element() > 0.0 && !placement.enclosed => {
                         vec![format!(
                             "environment: radiance = [{}, {}, {}]",
                             e.x, e.y, e.z

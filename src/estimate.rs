@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use glam::DVec3;
 
 use crate::film::Film;
-use crate::placement::{Placement, Side};
+use crate::placement::{PlacedSphere, Placement, Side};
 use crate::scene::{MaterialKind, Scene};
 use crate::settings::{Integrator, Settings};
 
@@ -171,8 +171,6 @@ fn moment_factor(kind: &MaterialKind, channel: usize, k: i32, termination: f64) 
     let uniform = 2f64.powi(k) / f64::from(k + 1);
     let moment = match *kind {
         MaterialKind::Diffuse { albedo } => uniform * albedo[channel].powi(k),
-        // Weights of at most 1, always.
-        MaterialKind::Mirror { .. } | MaterialKind::Dielectric { .. } if termination == 0.0 => 0.0,
         MaterialKind::Mirror { reflectance } => reflectance[channel].powi(k),
         MaterialKind::Dielectric { .. } => 1.0,
         MaterialKind::Reflective {
@@ -200,36 +198,56 @@ struct Cycle {
     channel: usize,
 }
 
+/// What an event at one sphere does to a moment.
+struct Factor {
+    factor: f64,
+    material: usize,
+    /// Whether it can be hit twice in a row.
+    sees_itself: bool,
+    /// Weights of at most 1, always: no cycle of such spheres alone counts.
+    bounded: bool,
+}
+
 /// The cycle with the largest factor. A sphere that paths are only outside of is not hit twice in a
 /// row: then the two largest factors alternate at best.
 fn worst_cycle(scene: &Scene, placement: &Placement, k: i32, termination: f64) -> Option<Cycle> {
     let cycle = |channel| {
-        let factors = placement.spheres.iter().map(|sphere| {
+        let factor = |sphere: &PlacedSphere| {
             let kind = &scene.materials[sphere.material].kind;
-            let factor = moment_factor(kind, channel, k, termination);
-            (factor, sphere.material, sphere.side != Side::Outside)
-        });
+            let delta = matches!(
+                kind,
+                MaterialKind::Mirror { .. } | MaterialKind::Dielectric { .. }
+            );
+            Factor {
+                factor: moment_factor(kind, channel, k, termination),
+                material: sphere.material,
+                sees_itself: sphere.side != Side::Outside,
+                bounded: delta && termination == 0.0,
+            }
+        };
+        let factors: Vec<Factor> = placement.spheres.iter().map(factor).collect();
         let mut cycles: Vec<Cycle> = Vec::new();
-        let mut largest: [Option<(f64, usize)>; 2] = [None, None];
-        for (factor, material, sees_itself) in factors {
-            if sees_itself {
-                cycles.push(Cycle {
-                    factor,
-                    materials: vec![material],
-                    channel,
-                });
-            }
-            if largest[0].is_none_or(|(f, _)| factor > f) {
-                largest = [Some((factor, material)), largest[0]];
-            } else if largest[1].is_none_or(|(f, _)| factor > f) {
-                largest[1] = Some((factor, material));
-            }
+        let sees_itself = |f: &&Factor| f.sees_itself && !f.bounded;
+        for factor in factors.iter().filter(sees_itself) {
+            cycles.push(Cycle {
+                factor: factor.factor,
+                materials: vec![factor.material],
+                channel,
+            });
         }
-        if let [Some((f, a)), Some((g, b))] = largest {
-            let mut materials = vec![a, b];
+        // The largest factor that can grow, with the largest of all others.
+        let largest = |skip: Option<usize>, all: bool| {
+            let those = factors.iter().enumerate();
+            let those = those.filter(|(i, f)| Some(*i) != skip && (all || !f.bounded));
+            those.max_by(|(_, a), (_, b)| a.factor.total_cmp(&b.factor))
+        };
+        if let Some((i, first)) = largest(None, false)
+            && let Some((_, second)) = largest(Some(i), true)
+        {
+            let mut materials = vec![first.material, second.material];
             materials.dedup();
             cycles.push(Cycle {
-                factor: (f * g).sqrt(),
+                factor: (first.factor * second.factor).sqrt(),
                 materials,
                 channel,
             });

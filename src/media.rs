@@ -6,6 +6,7 @@ use std::cmp::Ordering;
 
 use glam::DVec3;
 
+use crate::containment::ROUNDING;
 use crate::scene::{MaterialKind, Scene};
 
 /// The most levels: the kernel keeps the set of media a path is in as the bits of a word.
@@ -88,7 +89,7 @@ impl Media {
                 media.levels = media.levels.max(level + 1);
                 media.example.get_or_insert([ball.source, balls[*j].source]);
             }
-            if ball.center.length() < ball.radius {
+            if ball.center.length() < ball.radius * (1.0 - ROUNDING) {
                 media.camera.push(Medium {
                     level,
                     ior: ball.ior,

@@ -8,7 +8,7 @@
 
 use glam::DVec3;
 
-use crate::containment::{containers, reachable};
+use crate::containment::{ROUNDING, containers, reachable};
 use crate::lights::Lights;
 use crate::media::{Media, Medium};
 use crate::scene::{Handedness, MaterialKind, Scene};
@@ -20,7 +20,7 @@ pub struct Placement {
     /// Kernel units per scene unit, a power of two.
     pub scale: f64,
     /// Kernel radiance per radiance, a power of two that brings the brightest light to 2^32: sums of
-    /// squares in f32 then hold light of 1e20, and beside it light a 1e-29 of that.
+    /// squares in f32 then hold light of 1e20, and beside it light a 1e-26 of that.
     pub light: f64,
     /// The spheres that paths can reach, those with a pole frame first, else in scene order.
     pub spheres: Vec<PlacedSphere>,
@@ -30,6 +30,10 @@ pub struct Placement {
     pub media: Media,
     /// The dielectrics that the camera is in, `sphere` being an index into `spheres`.
     pub within: Vec<Medium>,
+    /// Whether an opaque sphere is all around the camera: no path leaves it.
+    pub enclosed: bool,
+    /// Spheres of the scene that equal an earlier one, with that one: they are not there.
+    pub coincident: Vec<[usize; 2]>,
     /// The camera.
     pub camera: PlacedCamera,
     /// How paths leave surfaces, distances in kernel units.
@@ -58,9 +62,9 @@ pub struct PlacedSphere {
     /// The dielectric that this sphere lies just within, an index into the placement's spheres:
     /// this sphere is hit only from within that.
     pub container: Option<usize>,
-    /// The dielectric that lies just within this sphere, an index into the placement's spheres: from
-    /// within that, this sphere is not hit.
-    pub core: Option<usize>,
+    /// The dielectrics that lie just within this sphere, indices into the placement's spheres: from
+    /// within any of them, this sphere is not hit.
+    pub cores: Vec<usize>,
 }
 
 /// Which side of a sphere's surface paths can be on.
@@ -133,9 +137,10 @@ impl Placement {
         // world coordinates.
         let centers: Vec<DVec3> = scene.spheres.iter().map(|s| s.center - origin).collect();
         let count = centers.len();
+        let mut coincident = Vec::new();
         let (sides, reachable, containers) = if offset == Offset::Exact {
             let sides: Vec<Side> = (0..count).map(|i| side(scene, i)).collect();
-            let reachable = reachable(scene, &sides);
+            let reachable = reachable(scene, &sides, &mut coincident);
             let containers = containers(scene, &sides, &reachable);
             (sides, reachable, containers)
         } else {
@@ -173,7 +178,7 @@ impl Placement {
                     side: sides[i],
                     level: media.level[i],
                     container: containers[i].and_then(|c| place[c]),
-                    core: None,
+                    cores: Vec::new(),
                 }
             })
             .collect();
@@ -181,7 +186,7 @@ impl Placement {
             if let Some(outer) = spheres[inner].container
                 && spheres[inner].side == Side::Tracked
             {
-                spheres[outer].core = Some(inner);
+                spheres[outer].cores.push(inner);
             }
         }
         let within = media.camera.iter().filter_map(|medium| {
@@ -189,11 +194,14 @@ impl Placement {
             Some(Medium { sphere, ..*medium })
         });
         let within = within.collect();
+        let enclosed = spheres.iter().any(|s| s.side == Side::Inside);
         let poles = spheres.iter().filter(|s| s.pole.is_some()).count();
         let camera = place_camera(scene, forward, approach, scale, width, height);
         let mut placement = Self {
             scale,
-            light: light(scene, &order),
+            light: light(scene, &order, enclosed),
+            enclosed,
+            coincident,
             spheres,
             poles,
             media,
@@ -208,12 +216,12 @@ impl Placement {
 }
 
 /// The unit of radiance for the reachable spheres `all`.
-fn light(scene: &Scene, all: &[usize]) -> f64 {
+fn light(scene: &Scene, all: &[usize], enclosed: bool) -> f64 {
     let emission = |i: &usize| scene.materials[scene.spheres[*i].material].emission;
     let brightest = all
         .iter()
         .map(emission)
-        .chain(scene.environment)
+        .chain(scene.environment.filter(|_| !enclosed))
         .fold(0.0, |most: f64, radiance| most.max(radiance.max_element()));
     if brightest > 0.0 {
         (32.0 - brightest.log2().floor()).exp2()
@@ -312,7 +320,7 @@ fn side(scene: &Scene, i: usize) -> Side {
     let kind = scene.materials[sphere.material].kind;
     if matches!(kind, MaterialKind::Dielectric { .. }) {
         Side::Tracked
-    } else if distance >= sphere.radius {
+    } else if distance >= sphere.radius * (1.0 - ROUNDING) {
         // A camera on the surface sees it from outside.
         Side::Outside
     } else {

@@ -214,7 +214,7 @@ fn placed(anchor: Row, radius: f64, pole: Option<DVec3>) -> PlacedSphere {
         side: Side::Tracked,
         level: 0,
         container: None,
-        core: None,
+        cores: Vec::new(),
     }
 }
 

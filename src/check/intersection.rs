@@ -58,7 +58,8 @@ pub(super) const CASES: &[Case] = &[
     Case {
         id: 9,
         name: "directions of any length",
-        setup: "|d| = 1e-15 to 1e15: t |d| is that of the unit direction to 4 ulp",
+        setup: "|d| = 1e-15 to 1e15, powers of two: t |d| is that of the unit direction to 4 ulp; \
+                other lengths: t within 4 ulp(D) (1 + b/sqrt(R^2 - b^2))",
         run: Run::On(lengths),
     },
 ];
@@ -175,24 +176,42 @@ fn grazing(context: &Context) -> Result<Measure> {
 fn lengths(context: &Context) -> Result<Measure> {
     let mut random = Random::new("lengths");
     let mut inputs: Vec<[Row; 2]> = Vec::new();
-    for _ in 0..context.size(20_000, 200_000) {
+    let mut add = |power: bool| {
         let distance = random.range(1.5, 20.0);
         let impact = random.range(0.0, 0.9);
         let (f, d) = ray(&mut random, distance, impact);
-        // A power of two: the direction stays the same.
-        let scale = random.range(-50.0, 50.0).round().exp2();
+        let exponent = random.range(-50.0, 50.0);
+        // A power of two leaves the direction as it is.
+        let scale = if power { exponent.round() } else { exponent }.exp2();
         let unit = to_row(d, 0.0);
-        inputs.push([to_row(f, 1.0), unit]);
-        inputs.push([to_row(f, 1.0), unit.map(|x| (f64::from(x) * scale) as f32)]);
+        let other = unit.map(|x| (f64::from(x) * scale) as f32);
+        inputs.extend([[to_row(f, 1.0), unit], [to_row(f, 1.0), other]]);
+    };
+    for i in 0..context.size(20_000, 200_000) {
+        add(i % 2 == 0);
     }
     let outputs = solve(context, &inputs)?;
-    let mut measure = Measure::new(4.0, "ulp");
-    for (pair, out) in inputs.chunks_exact(2).zip(outputs.chunks_exact(2)) {
+    let factor = context.disturbed(1.0e-5);
+    let mut measure = Measure::new(4.0, "ulp, or of the bound's");
+    for (i, (pair, out)) in inputs
+        .chunks_exact(2)
+        .zip(outputs.chunks_exact(2))
+        .enumerate()
+    {
         let (unit, other) = (f64::from(out[0][1][0]), f64::from(out[1][1][0]));
-        let scale = vector(pair[1][1]).length() / vector(pair[0][1]).length();
-        let unit = unit * context.disturbed(1.0e-5);
-        measure.add((other * scale - unit).abs() / ulp(unit), || {
-            format!("length {scale:e}: t = {other:e}, {unit} for length 1")
+        let length = vector(pair[1][1]).length();
+        if i % 2 == 0 {
+            let scale = length / vector(pair[0][1]).length();
+            let error = (other * scale - unit * factor).abs() / ulp(unit);
+            measure.add(error, || format!("length {length:e}: t = {other:e}"));
+            continue;
+        }
+        let (q, impact) = twin(pair[1], 1.0);
+        let truth = factor * root_outside(&q, false).unwrap_or(NO_HIT);
+        let slope = 1.0 + impact / (1.0 - impact * impact).sqrt();
+        let bound = ulp(vector(pair[1][0]).length()) * slope;
+        measure.add((other - truth).abs() * length / bound, || {
+            format!("length {length:e}: t = {other:e} for {truth:e}")
         });
     }
     Ok(measure)

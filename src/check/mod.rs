@@ -120,7 +120,7 @@ impl Measure {
         if failures > 0 && self.place.is_empty() {
             self.place = place();
         }
-        self.worst = self.failures as f64;
+        self.worst = self.worst.max(self.failures as f64);
     }
 
     /// Whether there were trials and none failed.

@@ -363,7 +363,8 @@ impl RenderArgs {
 #[derive(Clone, Debug, Args)]
 pub(super) struct CheckArgs {
     /// Only this case, by number or part of its name; may be repeated.
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", allow_hyphen_values = true,
+          value_parser = clap::builder::NonEmptyStringValueParser::new())]
     pub(super) case: Vec<String>,
     /// Fewer trials: under a minute without a GPU.
     #[arg(long)]

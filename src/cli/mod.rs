@@ -20,9 +20,9 @@ use clap::{CommandFactory as _, Parser, Subcommand};
 use crate::effects::Effects;
 use crate::error::{Error, Result};
 use crate::media::MAX_LEVELS;
-use crate::placement::Placement;
-use crate::scene::Scene;
-use crate::settings::Settings;
+use crate::placement::{Placement, Side};
+use crate::scene::{MaterialKind, Scene};
+use crate::settings::{Offset, Settings};
 
 pub use args::RenderArgs;
 
@@ -186,12 +186,13 @@ fn derive(scene: &Scene, settings: &Settings) -> Result<(Placement, Effects)> {
     let placement = Placement::with_offset(scene, settings.width, settings.height, settings.offset);
     if placement.media.levels > MAX_LEVELS {
         return Err(Error::Scene(format!(
-            "more than {MAX_LEVELS} dielectrics lie in or across each other: the scene needs {} \
-             levels of priority",
+            "dielectrics that touch, nest or overlap need {} levels of priority, more than \
+             {MAX_LEVELS}",
             placement.media.levels
         )));
     }
     check_magnitudes(&placement)?;
+    check_lens(scene, &placement)?;
     let effects = Effects::derive(scene, &placement, settings);
     Ok((placement, effects))
 }
@@ -215,6 +216,11 @@ fn check_magnitudes(placement: &Placement) -> Result<()> {
             return refuse(&format!("the center of sphere {}", sphere.source + 1));
         }
     }
+    if let Some(distances) = placement.offset.distances()
+        && !distances.iter().all(|x| (*x as f32).is_finite())
+    {
+        return refuse("the distance of --offset");
+    }
     if !placement.light.is_finite() {
         return Err(Error::Scene(
             "the brightest light of the scene is too dark to compute with".into(),
@@ -230,6 +236,26 @@ fn check_magnitudes(placement: &Placement) -> Result<()> {
         return refuse("the camera's lens");
     }
     Ok(())
+}
+
+/// Refuses a lens that straddles one of several dielectrics that share points: the points of the lens
+/// would be in different media, and paths start in one.
+fn check_lens(scene: &Scene, placement: &Placement) -> Result<()> {
+    if placement.media.levels == 0 || placement.offset != Offset::Exact {
+        return Ok(());
+    }
+    let straddled = placement.spheres.iter().find(|s| {
+        let material = &scene.materials[s.material];
+        s.side == Side::Sign && matches!(material.kind, MaterialKind::Dielectric { .. })
+    });
+    match straddled {
+        None => Ok(()),
+        Some(sphere) => Err(Error::Scene(format!(
+            "the lens lies on both sides of sphere {}, a dielectric, in a scene where dielectrics \
+             share points: make `aperture_radius` smaller, or move the camera",
+            sphere.source + 1
+        ))),
+    }
 }
 
 /// Prints a result. A reader that has seen enough (`| head`) is no error.

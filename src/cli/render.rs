@@ -44,6 +44,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
     let bare = |warning: &String| warning.trim_start_matches("warning: ").to_owned();
     let mut warnings: Vec<String> = job.loaded.warnings.iter().map(bare).collect();
     warnings.extend(job.variance.warning.clone());
+    warnings.extend(left_out(&job.placement));
     let opening = Instant::now();
     let gpu = open(args, &mut warnings)?;
     let opened = opening.elapsed();
@@ -272,6 +273,18 @@ fn renderer(gpu: Option<Gpu>, args: &RenderArgs, job: &Job) -> Result<Box<dyn Re
     Ok(match args.inject_fault {
         Some(fault) => Box::new(Faulty::new(renderer, device, fault)?),
         None => renderer,
+    })
+}
+
+/// Spheres of the scene that are not rendered, though nothing is wrong with them.
+fn left_out(placement: &Placement) -> Option<String> {
+    let [gone, other] = placement.coincident.first()?.map(|i| i + 1);
+    Some(match placement.coincident.len() {
+        1 => format!("sphere {gone} coincides with sphere {other}, and is left out"),
+        count => format!(
+            "{count} spheres coincide with others and are left out; the first: sphere {gone}, \
+             which is where sphere {other} is"
+        ),
     })
 }
 

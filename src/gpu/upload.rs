@@ -2,6 +2,7 @@
 
 use wgpu::util::DeviceExt as _;
 
+use crate::containment::MOST_CORES;
 use crate::effects::Effects;
 use crate::error::{Error, Result};
 use crate::gpu::layout::{LightRecord, MaterialRecord, PoleRecord, SphereRecord};
@@ -47,7 +48,9 @@ impl Uploads {
                 attributes.push(sphere.level);
             }
             if effects.has("nested") {
-                for other in [sphere.container, sphere.core] {
+                let core = |i: usize| sphere.cores.get(i).copied();
+                let cores = (0..MOST_CORES).map(core);
+                for other in std::iter::once(sphere.container).chain(cores) {
                     attributes.push(other.map_or(u32::MAX, |i| i as u32));
                 }
             }

@@ -117,9 +117,8 @@ fn within(placement: &Placement, effects: &Effects, index: usize) -> String {
 /// `nested_reach` in `shaders/scene/list.wesl`.
 fn nested_reach(placement: &Placement, effects: &Effects, sphere: &PlacedSphere) -> Option<String> {
     let container = sphere.container.map(|c| within(placement, effects, c));
-    let core = sphere
-        .core
-        .map(|c| format!("!{}", within(placement, effects, c)));
+    let cores = sphere.cores.iter();
+    let core = cores.map(|c| format!("!{}", within(placement, effects, *c)));
     let conditions: Vec<String> = container.into_iter().chain(core).collect();
     (effects.has("nested") && !conditions.is_empty()).then(|| conditions.join(" && "))
 }

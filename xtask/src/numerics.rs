@@ -51,7 +51,8 @@ fn short(value: &Value) -> String {
 }
 
 fn table(drivers: &[Driver], reports: &[Value]) -> String {
-    let text = |value: &Value| value.as_str().unwrap_or_default().to_owned();
+    // A bar would end the cell.
+    let text = |value: &Value| value.as_str().unwrap_or_default().replace('|', "\\|");
     let mut lines = Vec::new();
     let heads: Vec<&str> = drivers.iter().map(|d| d.name).collect();
     lines.push(format!("| case | | limit | {} |", heads.join(" | ")));

@@ -81,7 +81,7 @@ pub fn closest_hit(ray: &Ray, spheres: &[PlacedSphere]) -> Option<Hit> {
             Side::Sign => q.c < 0.0,
         };
         if sphere.container.is_some_and(|c| !is_within(&ray.media, c))
-            || sphere.core.is_some_and(|c| is_within(&ray.media, c))
+            || sphere.cores.iter().any(|c| is_within(&ray.media, *c))
         {
             continue;
         }
