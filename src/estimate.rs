@@ -121,7 +121,7 @@ pub struct VarianceReport {
 /// Judges the variance of the estimator that `settings` choose.
 ///
 /// The lecture's estimator goes on with the constant probability 1 - p and divides by it, so that the
-/// k-th moment of a path's weight changes at every event by a factor, [`moment_factor`], which may be
+/// k-th moment of a path's weight changes at every event by a factor, `moment_factor`, which may be
 /// more than 1. If the geometric mean of these factors is less than 1 along every path, the k-th
 /// moment of a sample is finite: k = 2 is the variance, k = 4 the variance of its estimate. In a
 /// closed sphere that is necessary too; elsewhere light may get away before it matters, which is not
