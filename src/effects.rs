@@ -77,6 +77,15 @@ impl Effects {
             _ => format!("--geometry {chosen}"),
         };
         let lecture = matches!(settings.integrator, Integrator::Lecture { .. });
+        let integrator = format!("integrator {}", settings.integrator.name());
+        let sampled = || {
+            reasons(placement.lights.table.iter().map(|light| {
+                let sphere = &placement.spheres[light.sphere];
+                let name = &scene.materials[sphere.material].name;
+                format!("sphere {} ({name})", sphere.source + 1)
+            }))
+        };
+        let to_lights = matches!(settings.integrator, Integrator::Path | Integrator::Nee);
         let table = vec![
             Effect {
                 name: "baked",
@@ -190,12 +199,25 @@ impl Effects {
             Effect {
                 name: "bsdf",
                 what: "BSDF sampling",
-                reasons: when(!lecture, "integrator bsdf".into()),
+                reasons: when(!lecture, integrator.clone()),
+            },
+            Effect {
+                name: "lights",
+                what: "light sampling: at every vertex a direction to a lamp",
+                reasons: if to_lights { sampled() } else { vec![] },
+            },
+            Effect {
+                name: "mis",
+                what: "weights between light sampling and BSDF sampling",
+                reasons: when(
+                    settings.integrator == Integrator::Path && !placement.lights.table.is_empty(),
+                    integrator.clone(),
+                ),
             },
             Effect {
                 name: "roulette",
                 what: "Russian roulette on the throughput",
-                reasons: when(settings.roulette && !lecture, "integrator bsdf".into()),
+                reasons: when(settings.roulette && !lecture, integrator),
             },
         ];
         Self { table }

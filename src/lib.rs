@@ -7,6 +7,7 @@
 //! 2. [`settings`]: what will be rendered, validated.
 //! 3. [`scene`]: the scene file, validated.
 //! 4. [`placement`]: where everything is, in f64, relative to where the picture is.
+//!    [`lights`]: what light sampling chooses from.
 //!    [`media`]: which of several dielectrics fills the space. [`containment`]: what lies in what.
 //! 5. [`effects`]: what the scene asks for; nothing else goes into the kernel.
 //! 6. [`shader`]: the kernel, linked for these effects from `shaders/`.
@@ -31,6 +32,7 @@ pub mod estimate;
 pub mod film;
 pub mod gpu;
 pub mod input;
+pub mod lights;
 pub mod media;
 pub mod output;
 pub mod placement;

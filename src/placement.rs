@@ -9,6 +9,7 @@
 use glam::DVec3;
 
 use crate::containment::{ROUNDING, containers, reachable};
+use crate::lights::Lights;
 use crate::media::{Media, Medium};
 use crate::scene::{Handedness, MaterialKind, Scene};
 use crate::settings::Offset;
@@ -19,7 +20,7 @@ pub struct Placement {
     /// Kernel units per scene unit, a power of two.
     pub scale: f64,
     /// Kernel radiance per radiance, a power of two that brings the brightest light to 2^32: sums of
-    /// squares in f32 then hold light of 1e20, and beside it light a 1e-29 of that.
+    /// squares in f32 then hold light of 1e20, and beside it light a 1e-26 of that.
     pub light: f64,
     /// The spheres that paths can reach, those with a pole frame first, else in scene order.
     pub spheres: Vec<PlacedSphere>,
@@ -37,6 +38,8 @@ pub struct Placement {
     pub camera: PlacedCamera,
     /// How paths leave surfaces, distances in kernel units.
     pub offset: Offset,
+    /// What light sampling chooses from.
+    pub lights: Lights,
 }
 
 /// A sphere in kernel units, relative to the placement's origin.
@@ -194,7 +197,7 @@ impl Placement {
         let enclosed = spheres.iter().any(|s| s.side == Side::Inside);
         let poles = spheres.iter().filter(|s| s.pole.is_some()).count();
         let camera = place_camera(scene, forward, approach, scale, width, height);
-        Self {
+        let mut placement = Self {
             scale,
             light: light(scene, &order, enclosed),
             enclosed,
@@ -205,7 +208,10 @@ impl Placement {
             within,
             camera,
             offset: offset.scaled(scale),
-        }
+            lights: Lights::default(),
+        };
+        placement.lights = Lights::new(scene, &placement);
+        placement
     }
 }
 

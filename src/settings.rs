@@ -58,7 +58,7 @@ impl Settings {
             samples: 0..scene.render.spp.unwrap_or(DEFAULT_SPP),
             seed: 0,
             max_bounces: scene.render.max_bounces.unwrap_or(DEFAULT_MAX_BOUNCES),
-            integrator: Integrator::Bsdf,
+            integrator: Integrator::Path,
             roulette: true,
             geometry: GeometryChoice::Auto,
             offset: Offset::Exact,
@@ -112,6 +112,11 @@ pub enum Integrator {
     },
     /// BSDF sampling with roulette on the throughput.
     Bsdf,
+    /// The same, and at every vertex a direction to a light: both estimates of what lights send are
+    /// weighted against each other.
+    Path,
+    /// The same, but what lights send is found by directions to them alone.
+    Nee,
 }
 
 impl Integrator {
@@ -121,6 +126,8 @@ impl Integrator {
         match self {
             Self::Lecture { .. } => "lecture",
             Self::Bsdf => "bsdf",
+            Self::Path => "path",
+            Self::Nee => "nee",
         }
     }
 }

@@ -17,7 +17,7 @@ use rayon::prelude::*;
 type Set = BTreeSet<&'static str>;
 
 /// All effects, in the table's order.
-const ALL: [&str; 19] = [
+const ALL: [&str; 21] = [
     "baked",
     "list",
     "pole",
@@ -36,14 +36,18 @@ const ALL: [&str; 19] = [
     "environment",
     "lecture",
     "bsdf",
+    "lights",
+    "mis",
     "roulette",
 ];
 
 /// Of these, only one can be in use.
-const EXCLUSIVE: [[&str; 2]; 6] = [
+const EXCLUSIVE: [[&str; 2]; 8] = [
     ["baked", "list"],
     ["lecture", "bsdf"],
     ["lecture", "roulette"],
+    ["lecture", "lights"],
+    ["lecture", "mis"],
     ["nudge", "ulp"],
     ["nested", "nudge"],
     ["nested", "ulp"],
@@ -53,7 +57,7 @@ const MATERIALS: [&str; 4] = ["diffuse", "mirror", "dielectric", "reflective"];
 
 /// Effects that must leave no trace in the WGSL where they are not in use, in any case, not even as
 /// a part of a name.
-const WORDS: [&str; 15] = [
+const WORDS: [&str; 16] = [
     "diffuse",
     "mirror",
     "dielectric",
@@ -66,12 +70,18 @@ const WORDS: [&str; 15] = [
     "pole",
     "interior",
     "lecture",
+    "lights",
     "nested",
     "nudge",
     "ulp",
 ];
 
 fn possible(set: &Set) -> bool {
+    let nudged = set.contains("nudge") || set.contains("ulp");
+    // A lamp that the lens straddles is not sampled, and here all lamps are of one material.
+    if set.contains("lights") && set.contains("straddle") && !nudged {
+        return false;
+    }
     // What is inside without glass, lens or nudge is a room around the camera, which has no sky.
     let room = set.contains("interior") && !set.contains("dielectric") && !set.contains("straddle");
     if room && set.contains("environment") {
@@ -90,6 +100,12 @@ fn completed(names: impl IntoIterator<Item = &'static str>) -> Set {
     }
     if !set.contains("lecture") {
         set.insert("bsdf");
+    }
+    if set.contains("mis") {
+        set.insert("lights");
+    }
+    if set.contains("lights") {
+        set.insert("emission");
     }
     let nudged = set.contains("nudge") || set.contains("ulp");
     if nudged {
@@ -186,6 +202,10 @@ fn asking_for(set: &Set) -> (Scene, Settings) {
         },
         integrator: if has("lecture") {
             Integrator::Lecture { termination: 0.2 }
+        } else if has("mis") {
+            Integrator::Path
+        } else if has("lights") {
+            Integrator::Nee
         } else {
             Integrator::Bsdf
         },
@@ -299,8 +319,8 @@ fn all_pairs() {
             }
         }
     }
-    // And a room with a sky.
-    assert_eq!(impossible, EXCLUSIVE.len() + 1);
+    // And a straddled lamp with either of the two effects of light sampling, and a room with a sky.
+    assert_eq!(impossible, EXCLUSIVE.len() + 3);
     check(&sets);
 }
 
@@ -314,7 +334,10 @@ fn largest() -> Vec<Set> {
                 let other = |name: &&str| match *name {
                     "baked" | "list" => *name == form,
                     "lecture" => lecture,
-                    "bsdf" | "roulette" => !lecture,
+                    "bsdf" | "roulette" | "mis" => !lecture,
+                    // See `possible`.
+                    "lights" => !lecture,
+                    "straddle" => lecture || exit != "nested",
                     "nested" | "nudge" | "ulp" => *name == exit,
                     _ => true,
                 };
@@ -346,7 +369,10 @@ fn all_and_all_but_one() {
             } else {
                 rest
             };
-            sets.insert(rest);
+            // Without the nudge, a lamp that the lens straddles is left: see `possible`.
+            if possible(&rest) {
+                sets.insert(rest);
+            }
         }
         sets.insert(all);
     }
@@ -360,10 +386,10 @@ fn every_possible_set() {
         completed(chosen.map(|(_, n)| *n))
     };
     // Of sets with the rare ones, there are too many to link them all in a minute.
-    let rare = ["straddle", "nested", "nudge", "ulp"];
+    let rare = ["straddle", "nested", "nudge", "ulp", "lights", "mis"];
     let common: Vec<&'static str> = ALL.into_iter().filter(|n| !rare.contains(n)).collect();
     let every = (0..1 << common.len()).map(|bits| subset(&common, bits));
-    let some = (0..4000u32).map(|i| subset(&ALL, i.wrapping_mul(0x9e37_79b9) >> 13));
+    let some = (0..4000u32).map(|i| subset(&ALL, i.wrapping_mul(0x9e37_79b9) >> 11));
     let sets: BTreeSet<Set> = every.chain(some).filter(possible).collect();
     eprintln!("{} sets", sets.len());
     check(&sets);

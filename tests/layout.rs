@@ -8,7 +8,8 @@ use common::{EMPTY, scene};
 use glam::DVec3;
 use gpu_trace::effects::Effects;
 use gpu_trace::gpu::layout::{
-    CameraRecord, CountersRecord, DispatchRecord, MaterialRecord, PoleRecord, SphereRecord,
+    CameraRecord, CountersRecord, DispatchRecord, LightRecord, MaterialRecord, PoleRecord,
+    SphereRecord,
 };
 use gpu_trace::gpu::probe::ShapeRecord;
 use gpu_trace::placement::Placement;
@@ -74,8 +75,8 @@ fn check(name: &str, host: &Layout, kernel: &Kernel) {
 }
 
 /// Everything that fixed structs need.
-const FULL: [&str; 7] = [
-    "list", "bsdf", "pole", "interior", "lens", "diffuse", "emission",
+const FULL: [&str; 9] = [
+    "list", "bsdf", "pole", "interior", "lens", "diffuse", "emission", "lights", "mis",
 ];
 
 /// Structs that GLSL would lay out otherwise, and why. naga writes their members without offsets
@@ -229,6 +230,17 @@ fn fixed_structs_agree() {
         advanced,
     });
     check("Counters", &counters, &kernel);
+    let light = host!(LightRecord {
+        center,
+        radius,
+        emission,
+        probability,
+        threshold,
+        other,
+        sphere,
+        unused,
+    });
+    check("Light", &light, &kernel);
 }
 
 #[test]

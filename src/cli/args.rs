@@ -141,11 +141,11 @@ pub struct RenderArgs {
         long,
         value_name = "NAME",
         value_enum,
-        default_value = "bsdf",
+        default_value = "path",
         hide_possible_values = true,
         hide_default_value = true,
         help_heading = "Light transport",
-        help = "Estimator: bsdf (BSDF sampling) or lecture (uniform hemisphere, constant p) [default: bsdf]"
+        help = "Estimator: path (BSDF and light sampling), bsdf, nee (light sampling alone), or lecture (uniform hemisphere, constant p) [default: path]"
     )]
     pub integrator: IntegratorArg,
     #[arg(
@@ -248,7 +248,7 @@ choices! {
     /// `--progress`
     ProgressArg { Auto, Plain, Json, None }
     /// `--integrator`
-    IntegratorArg { Bsdf, Lecture }
+    IntegratorArg { Path, Bsdf, Nee, Lecture }
     /// `--sampler`
     SamplerArg { Independent }
     /// `--roulette`
@@ -322,6 +322,12 @@ impl RenderArgs {
             return Err(Error::Usage(
                 "--termination is the lecture's: add --integrator lecture".into(),
             ));
+        }
+        match self.integrator {
+            IntegratorArg::Path => settings.integrator = Integrator::Path,
+            IntegratorArg::Bsdf => settings.integrator = Integrator::Bsdf,
+            IntegratorArg::Nee => settings.integrator = Integrator::Nee,
+            IntegratorArg::Lecture => {}
         }
         if lecture && self.roulette.is_some() {
             return Err(Error::Usage(

@@ -144,7 +144,7 @@ fn lacks(adapter: &wgpu::Adapter, limits: &wgpu::Limits) -> Option<String> {
         (
             "storage buffers a stage",
             limits.max_storage_buffers_per_shader_stage,
-            6,
+            7,
         ),
         (
             "invocations a workgroup",

@@ -8,8 +8,9 @@ use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 
 use crate::effects::Effects;
-use crate::placement::{PlacedCamera, PlacedSphere};
-use crate::scene::{Material, MaterialKind};
+use crate::lights::Light;
+use crate::placement::{PlacedCamera, PlacedSphere, Placement};
+use crate::scene::{Material, MaterialKind, Scene, luminance};
 
 /// `Sphere` of `shaders/scene/list.wesl`: a sphere about its centre.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
@@ -55,6 +56,40 @@ impl PoleRecord {
             curvature: (1.0 / sphere.radius) as f32,
             normal: normal.as_vec3().to_array(),
             unused: 0.0,
+        }
+    }
+}
+
+/// `Light` of `shaders/light/sphere.wesl`.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+#[expect(missing_docs, reason = "the members are those of the kernel's struct")]
+pub struct LightRecord {
+    pub center: [f32; 3],
+    pub radius: f32,
+    pub emission: [f32; 3],
+    pub probability: f32,
+    pub threshold: f32,
+    pub other: u32,
+    pub sphere: u32,
+    pub unused: u32,
+}
+
+impl LightRecord {
+    /// The record of a light.
+    #[must_use]
+    pub fn new(light: &Light, scene: &Scene, placement: &Placement) -> Self {
+        let sphere = &placement.spheres[light.sphere];
+        let emission = scene.materials[sphere.material].emission * placement.light;
+        Self {
+            center: sphere.anchor.as_vec3().to_array(),
+            radius: sphere.radius as f32,
+            emission: emission.as_vec3().to_array(),
+            probability: light.probability as f32,
+            threshold: light.threshold as f32,
+            other: light.alias as u32,
+            sphere: light.sphere as u32,
+            unused: 0,
         }
     }
 }
@@ -276,9 +311,4 @@ impl MaterialRecord {
 /// times mu.
 fn lobe_albedo(epsilon: f64, mu: f64) -> f64 {
     mu * std::f64::consts::PI * epsilon * (2.0 - epsilon)
-}
-
-/// Relative luminance of linear RGB (ITU-R BT.709).
-fn luminance(v: DVec3) -> f64 {
-    v.dot(DVec3::new(0.2126, 0.7152, 0.0722))
 }

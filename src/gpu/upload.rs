@@ -5,7 +5,7 @@ use wgpu::util::DeviceExt as _;
 use crate::containment::MOST_CORES;
 use crate::effects::Effects;
 use crate::error::{Error, Result};
-use crate::gpu::layout::{MaterialRecord, PoleRecord, SphereRecord};
+use crate::gpu::layout::{LightRecord, MaterialRecord, PoleRecord, SphereRecord};
 use crate::placement::Placement;
 use crate::scene::Scene;
 use crate::shader::Kernel;
@@ -22,6 +22,13 @@ impl Uploads {
         effects: &Effects,
     ) -> Self {
         let mut all: Vec<(u32, &'static str, Vec<u8>)> = Vec::new();
+        if effects.has("lights") {
+            let lights = placement.lights.table.iter();
+            let records: Vec<LightRecord> = lights
+                .map(|light| LightRecord::new(light, scene, placement))
+                .collect();
+            all.push((14, "lights", bytemuck::cast_slice(&records).to_vec()));
+        }
         if effects.has("baked") {
             return Self(all);
         }

@@ -2,15 +2,18 @@
 
 use std::ops::Range;
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
+use super::bsdf::evaluate::evaluate;
+use super::bsdf::sample::bsdf_sample;
 use super::bsdf::scatter::scatter;
 use super::core::random::{random4, sample_key};
 use super::light::environment_radiance;
+use super::light::sphere::{choose_light, light_density, power_weight, sample_cone};
 use super::scene::camera::camera_ray;
 use super::scene::priority::{cross_surface, relative_index};
-use super::scene::ray::{leave, vertex_at};
+use super::scene::ray::{Hit, Ray, Vertex, leave, vertex_at};
 use super::scene::sphere::closest_hit;
 use crate::error::{Error, Result};
 use crate::film::{BLOCK, NonFinite, PixelSums, Tally, Window};
@@ -25,6 +28,9 @@ use crate::settings::{Integrator, Rect, Settings, stream_words};
 pub fn roulette_survival(largest: f64) -> f64 {
     (2.0 * largest).min(1.0)
 }
+
+/// Dimension of the numbers for light sampling at the first vertex.
+const LIGHT_DIMENSION: u32 = 65_537;
 
 /// What one path found.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -67,6 +73,8 @@ impl PathTracer<'_> {
         let mut result = PathResult::default();
         let mut throughput = DVec3::ONE;
         let mut compression = 1.0;
+        // pdf of the direction in which the path came; 0: light sampling could not have found it.
+        let mut density = 0.0;
         loop {
             result.rays += 1;
             let Some(hit) = closest_hit(&ray, &placement.spheres) else {
@@ -75,7 +83,8 @@ impl PathTracer<'_> {
             };
             let sphere = &placement.spheres[hit.index];
             let material = &scene.materials[sphere.material];
-            result.radiance += throughput * material.emission;
+            let share = self.emission_share(&ray, &hit, density);
+            result.radiance += throughput * share * material.emission;
             if result.bounces == settings.max_bounces {
                 result.cut = throughput;
                 return result;
@@ -92,13 +101,20 @@ impl PathTracer<'_> {
                 u,
                 lecture,
             );
+            if self.samples_lights() {
+                let v = random(LIGHT_DIMENSION + result.bounces);
+                let (found, rays) = self.light_from(&ray, &hit, &vertex, v);
+                result.radiance += throughput * found;
+                result.rays += rays;
+            }
+            density = s.density;
             throughput *= s.weight;
             compression *= s.compression;
             let largest = (throughput * compression).max_element();
             let survival = match settings.integrator {
                 Integrator::Lecture { termination } => 1.0 - termination,
-                Integrator::Bsdf if settings.roulette => roulette_survival(largest),
-                Integrator::Bsdf => 1.0,
+                _ if settings.roulette => roulette_survival(largest),
+                _ => 1.0,
             };
             if largest <= 0.0 || u[3] >= survival {
                 return result;
@@ -115,6 +131,69 @@ impl PathTracer<'_> {
             }
             result.bounces += 1;
         }
+    }
+}
+
+impl PathTracer<'_> {
+    /// Whether vertices look for lights.
+    fn samples_lights(&self) -> bool {
+        matches!(self.settings.integrator, Integrator::Path | Integrator::Nee)
+            && !self.placement.lights.table.is_empty()
+    }
+
+    /// The share of the emission of a hit that the path counts, which came with `density`: light
+    /// sampling has the rest.
+    fn emission_share(&self, ray: &Ray, hit: &Hit, density: f64) -> f64 {
+        let sphere = &self.placement.spheres[hit.index];
+        let emission = self.scene.materials[sphere.material].emission;
+        if !self.samples_lights() || density <= 0.0 {
+            return 1.0;
+        }
+        let other = light_density(ray, hit, sphere, emission, &self.placement.lights);
+        match self.settings.integrator {
+            Integrator::Path => power_weight(density, other),
+            _ if other > 0.0 => 0.0,
+            _ => 1.0,
+        }
+    }
+
+    /// What one light, chosen at random, sends over a vertex into the path, and the rays it took.
+    fn light_from(&self, ray: &Ray, hit: &Hit, vertex: &Vertex, u: [f64; 4]) -> (DVec3, u32) {
+        let nothing = (DVec3::ZERO, 0);
+        let spheres = &self.placement.spheres;
+        let material = |index: usize| &self.scene.materials[spheres[index].material];
+        let Some(light) = choose_light(&self.placement.lights, [u[2], u[3]]) else {
+            return nothing;
+        };
+        let target = &spheres[light.sphere];
+        let w = (target.anchor - vertex.anchor) - vertex.offset;
+        let place = DVec2::new(u[0], u[1]);
+        let sample = sample_cone(light.probability, target.radius, w, place);
+        let Some((direction, density)) = sample else {
+            return nothing;
+        };
+        let kind = &material(hit.index).kind;
+        let Some((value, other)) = evaluate(kind, vertex.normal, ray.direction, direction) else {
+            return nothing;
+        };
+        if light.sphere == hit.index || other <= 0.0 {
+            return nothing;
+        }
+        let s = bsdf_sample(direction, DVec3::ONE);
+        let shadow = leave(ray.clone(), hit, vertex, &s, self.placement.offset);
+        // A ray that misses the limb by a rounding has seen the light all the same.
+        let limb = w.dot(direction);
+        let hidden = closest_hit(&shadow, spheres)
+            .is_some_and(|first| first.index != light.sphere && first.t < limb);
+        if hidden {
+            return (DVec3::ZERO, 1);
+        }
+        let weight = match self.settings.integrator {
+            Integrator::Path => power_weight(density, other),
+            _ => 1.0,
+        };
+        let emission = material(light.sphere).emission;
+        (weight / density * value * emission, 1)
     }
 }
 

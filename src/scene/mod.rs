@@ -136,3 +136,9 @@ pub struct Sphere {
     /// spheres win over larger ones. Only dielectric spheres may have one.
     pub priority: Option<i32>,
 }
+
+/// Relative luminance of linear RGB (ITU-R BT.709).
+#[must_use]
+pub fn luminance(v: DVec3) -> f64 {
+    v.dot(DVec3::new(0.2126, 0.7152, 0.0722))
+}

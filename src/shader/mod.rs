@@ -154,8 +154,12 @@ pub fn ray_steps(placement: &Placement, effects: &Effects) -> u32 {
         return 1;
     }
     let others = placement.spheres.len() - placement.poles;
-    // The path loop's own, one a pole sphere, one for eight others, and one to leave each loop.
-    (placement.poles + others.div_ceil(8) + 3) as u32
+    // One a pole sphere, one for eight others, and one to leave each loop; with light sampling there
+    // are two rays a vertex.
+    let ray = placement.poles + others.div_ceil(8) + 2;
+    let rays = if effects.has("lights") { 2 } else { 1 };
+    // And the path loop's own.
+    (rays * ray + 1) as u32
 }
 
 /// The module `config`: sizes and constants of this scene.
@@ -174,6 +178,14 @@ fn config(scene: &Scene, placement: &Placement, effects: &Effects) -> String {
     if effects.has("environment") {
         let radiance = scene.environment.unwrap_or_default() * placement.light;
         text += &format!("const ENVIRONMENT: vec3f = {};\n", baked::vector(radiance));
+    }
+    if effects.has("lights") {
+        let lights = &placement.lights;
+        text += &format!(
+            "const LIGHT_COUNT: u32 = {}u;\nconst LIGHT_SHARE: f32 = {};\n",
+            lights.table.len().max(1),
+            baked::number(lights.share / placement.light)
+        );
     }
     if effects.has("nudge") {
         let [back, out] = placement.offset.distances().unwrap_or_default();

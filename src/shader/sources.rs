@@ -27,5 +27,7 @@ sources![
     "bsdf/mirror",
     "bsdf/dielectric",
     "bsdf/reflective",
+    "bsdf/evaluate",
     "light/environment",
+    "light/sphere",
 ];

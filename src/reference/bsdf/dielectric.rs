@@ -43,6 +43,7 @@ pub fn sample_dielectric(eta: f64, normal: DVec3, arrival: DVec3, u: [f64; 4]) -
     BsdfSample {
         direction: (arrival / eta + (cos_i / eta - f.cos_t) * normal).normalize(),
         weight: DVec3::splat(1.0 / (eta * eta)),
+        density: 0.0,
         crossed: true,
         compression: eta * eta,
     }

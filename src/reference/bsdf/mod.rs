@@ -2,6 +2,7 @@
 
 pub mod dielectric;
 pub mod diffuse;
+pub mod evaluate;
 pub mod mirror;
 pub mod reflective;
 pub mod sample;

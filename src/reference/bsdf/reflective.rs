@@ -6,6 +6,7 @@ use glam::{DVec2, DVec3};
 
 use super::sample::{BsdfSample, bsdf_sample};
 use crate::reference::core::sampling::{cap_direction, cosine_direction, sphere_direction};
+use crate::scene::luminance;
 
 /// The lecture's reflective material.
 #[derive(Clone, Copy, Debug)]
@@ -18,10 +19,6 @@ pub struct Reflective {
     pub epsilon: f64,
     /// The BRDF in the lobe for specular = 1, 1/sr.
     pub mu: f64,
-}
-
-fn luminance(v: DVec3) -> f64 {
-    v.dot(DVec3::new(0.2126, 0.7152, 0.0722))
 }
 
 /// Whether w.d_r > 1 - epsilon.
@@ -84,7 +81,9 @@ pub fn sample_reflective(
     }
     let lobe = chosen || in_lobe(material, w, d_r);
     let pdf = pdf_reflective(material, q, cosine, lobe);
-    bsdf_sample(w, cosine / pdf * eval_reflective(material, lobe))
+    let mut s = bsdf_sample(w, cosine / pdf * eval_reflective(material, lobe));
+    s.density = pdf;
+    s
 }
 
 /// The lecture's: uniform on the hemisphere, pdf = 1/(2 pi).

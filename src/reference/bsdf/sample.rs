@@ -9,6 +9,8 @@ pub struct BsdfSample {
     pub direction: DVec3,
     /// f cos/pdf
     pub weight: DVec3,
+    /// pdf of the direction in solid angle; 0 for a delta lobe.
+    pub density: f64,
     /// Whether the path crossed the surface.
     pub crossed: bool,
     /// Index ratio squared that a refraction took out of the weight.
@@ -21,6 +23,7 @@ pub fn bsdf_sample(direction: DVec3, weight: DVec3) -> BsdfSample {
     BsdfSample {
         direction,
         weight,
+        density: 0.0,
         crossed: false,
         compression: 1.0,
     }

@@ -1,5 +1,7 @@
 //! Twins of `shaders/light/`.
 
+pub mod sphere;
+
 use glam::DVec3;
 
 use crate::scene::Scene;

@@ -1,0 +1,124 @@
+//! Which spheres light sampling chooses from, and how likely each is.
+//!
+//! Part of the placement: decided once, for both renderers.
+
+use crate::placement::{PlacedSphere, Placement, Side};
+use crate::scene::{Scene, luminance};
+use crate::settings::Offset;
+
+/// A sphere that light sampling can choose.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Light {
+    /// Index into the placement's spheres.
+    pub sphere: usize,
+    /// Of being chosen: its share of the power of all.
+    pub probability: f64,
+    /// In the alias table: the entry is this light below the threshold, else `alias`.
+    pub threshold: f64,
+    /// Index of another light.
+    pub alias: usize,
+}
+
+/// All lights that are sampled.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Lights {
+    /// The alias table.
+    pub table: Vec<Light>,
+    /// One over the sum of r² luminance(radiance), in scene radiance and kernel lengths.
+    pub share: f64,
+}
+
+/// Whether light sampling finds this sphere from outside. Walls (with a pole frame) are left to BSDF
+/// sampling: they fill so much of the view that it finds them as well, and nothing is gained by
+/// directions that the rest of the scene mostly hides.
+fn is_sampled(scene: &Scene, sphere: &PlacedSphere) -> bool {
+    let emission = scene.materials[sphere.material].emission;
+    sphere.pole.is_none() && sphere.side != Side::Inside && luminance(emission) > 0.0
+}
+
+impl Lights {
+    /// The lights of `scene`; none if the lens straddles a lamp: what is sampled and what is not must
+    /// be known when a ray hits it.
+    #[must_use]
+    pub fn new(scene: &Scene, placement: &Placement) -> Self {
+        let unknown = |s: &PlacedSphere| {
+            s.side == Side::Sign && scene.materials[s.material].emission.max_element() > 0.0
+        };
+        if placement.offset == Offset::Exact && placement.spheres.iter().any(unknown) {
+            return Self::default();
+        }
+        let chosen: Vec<(usize, f64)> = placement
+            .spheres
+            .iter()
+            .enumerate()
+            .filter(|(_, s)| is_sampled(scene, s))
+            .map(|(i, s)| {
+                let emission = scene.materials[s.material].emission;
+                (i, s.radius * s.radius * luminance(emission))
+            })
+            .collect();
+        let total: f64 = chosen.iter().map(|(_, power)| power).sum();
+        if chosen.is_empty() || !(total > 0.0 && total.is_finite()) {
+            return Self::default();
+        }
+        let probabilities: Vec<f64> = chosen.iter().map(|(_, power)| power / total).collect();
+        let table = alias_table(&probabilities)
+            .into_iter()
+            .zip(&chosen)
+            .zip(&probabilities)
+            .map(|(((threshold, alias), (sphere, _)), probability)| Light {
+                sphere: *sphere,
+                probability: *probability,
+                threshold,
+                alias,
+            });
+        Self {
+            table: table.collect(),
+            share: 1.0 / total,
+        }
+    }
+}
+
+/// Threshold and alias of each entry: Vose, "A Linear Algorithm for Generating Random Numbers with a
+/// Given Distribution" (IEEE Trans. Software Eng. 17(9), 1991).
+fn alias_table(probabilities: &[f64]) -> Vec<(f64, usize)> {
+    let count = probabilities.len();
+    let mut scaled: Vec<f64> = probabilities.iter().map(|p| p * count as f64).collect();
+    let mut table: Vec<(f64, usize)> = (0..count).map(|i| (1.0, i)).collect();
+    let (mut small, mut large): (Vec<usize>, Vec<usize>) =
+        (0..count).partition(|i| scaled[*i] < 1.0);
+    while !large.is_empty()
+        && let Some(less) = small.pop()
+        && let Some(&more) = large.last()
+    {
+        table[less] = (scaled[less], more);
+        scaled[more] -= 1.0 - scaled[less];
+        if scaled[more] < 1.0 {
+            large.pop();
+            small.push(more);
+        }
+    }
+    table
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_alias_table_has_the_probabilities() {
+        for count in [1usize, 2, 3, 17, 1000] {
+            let raw: Vec<f64> = (0..count).map(|i| ((i * 7919) % 101 + 1) as f64).collect();
+            let total: f64 = raw.iter().sum();
+            let wanted: Vec<f64> = raw.iter().map(|x| x / total).collect();
+            let mut found = vec![0.0; count];
+            for (i, (threshold, alias)) in alias_table(&wanted).into_iter().enumerate() {
+                found[i] += threshold / count as f64;
+                found[alias] += (1.0 - threshold) / count as f64;
+            }
+            for (a, b) in wanted.iter().zip(&found) {
+                assert!((a - b).abs() < 1.0e-12, "{count}: {a} {b}");
+            }
+        }
+    }
+}
