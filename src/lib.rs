@@ -4,7 +4,7 @@
 //! decided:
 //!
 //! 1. [`cli`]: what was typed.
-//! 2. [`settings`]: what will be rendered, validated.
+//! 2. [`settings`]: what will be rendered, validated. [`sampler`]: which samples are placed together.
 //! 3. [`scene`]: the scene file, validated.
 //! 4. [`placement`]: where everything is, in f64, relative to where the picture is.
 //!    [`media`]: which of several dielectrics fills the space. [`containment`]: what lies in what.
@@ -33,6 +33,7 @@ pub mod output;
 pub mod placement;
 pub mod reference;
 pub mod render;
+pub mod sampler;
 pub mod scene;
 pub mod settings;
 pub mod shader;
