@@ -20,20 +20,19 @@ impl Sampler {
         }
     }
 
-    /// Samples of the batch that has the sample `index`, a power of two. Batches begin at multiples of
-    /// their length.
+    /// Samples of the batch that has the sample `index`: a power of two, and batches begin at multiples
+    /// of their length. The spread of batches tells the error, since they are independent of each
+    /// other; the samples of a scramble, which is a batch, are not.
+    ///
+    /// A longer scramble is better, and more batches make a better estimate: the length grows such that
+    /// there are always at least 16 batches from 64 samples on, counted from sample 0, and all batches
+    /// of a window (`film::window_end`) are of one length.
     #[must_use]
     pub fn batch(self, index: u64) -> u64 {
-        match self {
-            Self::Independent => 4,
-            Self::Sobol => {
-                let s: u64 = std::env::var("GT_S").map_or(16, |s| s.parse().unwrap());
-                if s == 0 {
-                    return if index < 64 { 4 } else if index < 256 { 16 } else { 64 };
-                }
-                let _ = index;
-                s
-            }
+        match (self, index) {
+            (Self::Independent, _) | (Self::Sobol, 0..64) => 4,
+            (Self::Sobol, 64..256) => 16,
+            (Self::Sobol, _) => 64,
         }
     }
 }

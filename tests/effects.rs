@@ -9,6 +9,7 @@ use std::fmt::Write as _;
 use common::{scene, scene_file, scene_files};
 use gpu_trace::effects::Effects;
 use gpu_trace::placement::Placement;
+use gpu_trace::sampler::Sampler;
 use gpu_trace::scene::Scene;
 use gpu_trace::settings::{GeometryChoice, Integrator, Offset, Settings};
 use gpu_trace::shader::{Stage, link};
@@ -17,7 +18,7 @@ use rayon::prelude::*;
 type Set = BTreeSet<&'static str>;
 
 /// All effects, in the table's order.
-const ALL: [&str; 19] = [
+const ALL: [&str; 20] = [
     "baked",
     "list",
     "pole",
@@ -27,6 +28,7 @@ const ALL: [&str; 19] = [
     "nudge",
     "ulp",
     "lens",
+    "sobol",
     "diffuse",
     "mirror",
     "dielectric",
@@ -53,13 +55,14 @@ const MATERIALS: [&str; 4] = ["diffuse", "mirror", "dielectric", "reflective"];
 
 /// Effects that must leave no trace in the WGSL where they are not in use, in any case, not even as
 /// a part of a name.
-const WORDS: [&str; 15] = [
+const WORDS: [&str; 16] = [
     "diffuse",
     "mirror",
     "dielectric",
     "priority",
     "reflective",
     "lens",
+    "sobol",
     "environment",
     "emission",
     "roulette",
@@ -185,6 +188,11 @@ fn asking_for(set: &Set) -> (Scene, Settings) {
             Integrator::Bsdf
         },
         roulette: has("roulette"),
+        sampler: if has("sobol") {
+            Sampler::Sobol
+        } else {
+            Sampler::Independent
+        },
         offset: match (has("nudge"), has("ulp")) {
             (true, _) => Offset::Out(1.0e-4),
             (_, true) => Offset::Ulp,
@@ -354,10 +362,10 @@ fn every_possible_set() {
         completed(chosen.map(|(_, n)| *n))
     };
     // Of sets with the rare ones, there are too many to link them all in a minute.
-    let rare = ["straddle", "nested", "nudge", "ulp"];
+    let rare = ["straddle", "nested", "nudge", "ulp", "sobol"];
     let common: Vec<&'static str> = ALL.into_iter().filter(|n| !rare.contains(n)).collect();
     let every = (0..1 << common.len()).map(|bits| subset(&common, bits));
-    let some = (0..4000u32).map(|i| subset(&ALL, i.wrapping_mul(0x9e37_79b9) >> 13));
+    let some = (0..4000u32).map(|i| subset(&ALL, i.wrapping_mul(0x9e37_79b9) >> 12));
     let sets: BTreeSet<Set> = every.chain(some).filter(possible).collect();
     eprintln!("{} sets", sets.len());
     check(&sets);

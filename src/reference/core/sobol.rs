@@ -16,14 +16,13 @@ const DIRECTIONS: [u32; 6] = [
 #[must_use]
 pub fn shuffled(place: u32, last: u32, key: u32) -> u32 {
     let mut x = place ^ key;
-    x ^= (x & last) >> 3;
     x = x.wrapping_mul(key >> 5 | 1);
-    x ^= (x & last) >> 2;
+    x ^= (x & last) >> 1;
     x ^= key >> 12;
     x = x.wrapping_mul(key >> 17 | 1);
-    x ^= (x & last) >> 3;
+    x ^= (x & last) >> 2;
     x = x.wrapping_mul(key >> 9 | 1);
-    x ^= (x & last) >> 1;
+    x ^= (x & last) >> 3;
     x.wrapping_add(key >> 25) & last
 }
 
@@ -57,8 +56,7 @@ pub fn sobol_words(key: [u32; 2], dimension: u32, place: u32, last: u32) -> [u32
         [0, 1, 2, 3].map(|i| word(key, dimension.wrapping_mul(4).wrapping_add(i)));
     let digits = owen_scramble(sobol_point(shuffled(place, last, order)), a, b, shift);
     let number = dimension.wrapping_mul(64).wrapping_add(place);
-    let random =
-        [0, 1].map(|i| word([key[1], key[0]], number.wrapping_mul(2).wrapping_add(i)));
+    let random = [0, 1].map(|i| word([key[1], key[0]], number.wrapping_mul(2).wrapping_add(i)));
     [0, 1, 2, 3].map(|i| {
         let tail = random[i % 2].rotate_left(i as u32 / 2 * 16);
         digits << (26 - 8 * i) & 0xfc00_0000 | tail >> 6
