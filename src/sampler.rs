@@ -4,9 +4,9 @@
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Sampler {
     /// Each by itself: `core/random`.
-    #[default]
     Independent,
     /// In scrambles of a Sobol' sequence: `core/sobol`.
+    #[default]
     Sobol,
 }
 

@@ -153,11 +153,11 @@ pub struct RenderArgs {
         long,
         value_name = "NAME",
         value_enum,
-        default_value = "independent",
+        default_value = "sobol",
         hide_possible_values = true,
         hide_default_value = true,
         help_heading = "Light transport",
-        help = "Sample placement: independent or sobol (scrambled Sobol' sequences) [default: independent]"
+        help = "Sample placement: sobol (scrambled Sobol' sequences) or independent [default: sobol]"
     )]
     pub sampler: SamplerArg,
     #[arg(
@@ -251,7 +251,7 @@ choices! {
     /// `--integrator`
     IntegratorArg { Bsdf, Lecture }
     /// `--sampler`
-    SamplerArg { Independent, Sobol }
+    SamplerArg { Sobol, Independent }
     /// `--roulette`
     OnOff { On, Off }
     /// `--backend`
