@@ -231,10 +231,11 @@ fn shuffles_are_permutations_without_a_bias() {
             keys.iter().map(|key| shuffled(place, last, *key)).collect()
         });
         assert!(
-            worst < 9.0,
+            worst < 6.0,
             "{worst} times as often as others, of {}",
             last + 1
         );
+        eprintln!("{worst:.2} times as often as others, of {}", last + 1);
         // Companion: with a shift alone every pair stays what it is.
         let worst = worst_pair(last, |place| {
             keys.iter().map(|key| (place ^ key) & last).collect()
@@ -414,10 +415,8 @@ fn products_over_two_vertices_are_no_worse_than_independent_ones() {
             for k in 1..6 {
                 // Flips a bit by a hash of the bits below.
                 let below = x & ((1 << k) - 1);
-                x ^= (shuffle.rotate_left(k * 5) ^ below.wrapping_mul(0x9e37_79b9) >> 7)
-                    .count_ones()
-                    % 2
-                    << k;
+                let hash = shuffle.rotate_left(k * 5) ^ (below.wrapping_mul(0x9e37_79b9) >> 7);
+                x ^= (hash.count_ones() % 2) << k;
             }
             (sobol_point(bits(x & last)) << 26) ^ shift
         };
