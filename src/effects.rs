@@ -5,6 +5,7 @@
 //! (`shaders/`) name effects in `@if(...)`; [`Effects::flags`] says which are on.
 
 use crate::placement::{PlacedSphere, Placement, Side};
+use crate::sampler::Sampler;
 use crate::scene::{MaterialKind, Scene};
 use crate::settings::{GeometryChoice, Integrator, Offset, Settings};
 
@@ -145,6 +146,11 @@ impl Effects {
                     scene.camera.aperture_radius > 0.0,
                     format!("camera: aperture_radius = {}", scene.camera.aperture_radius),
                 ),
+            },
+            Effect {
+                name: "sobol",
+                what: "samples in scrambled Sobol' sequences",
+                reasons: when(settings.sampler == Sampler::Sobol, "sampler sobol".into()),
             },
             Effect {
                 name: "diffuse",

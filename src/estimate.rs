@@ -16,7 +16,7 @@ pub struct Estimate {
     pub mean: f64,
     /// The relative error: sqrt of the mean over pixels and channels of s²/(m² + (0.1 M)²), with
     /// the pixel's mean m and standard error s and the image's mean M. A fraction. `None` while
-    /// there are fewer than 16 blocks of samples, and for a black image.
+    /// there are fewer than 16 batches of samples, and for a black image.
     pub error: Option<f64>,
 }
 

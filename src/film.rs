@@ -1,11 +1,11 @@
-//! The film: f64 sums over all samples so far, and their variance from blocks of samples.
+//! The film: f64 sums over all samples so far, and their variance from batches of samples.
 
 use std::ops::Range;
 
 use crate::settings::Rect;
 
-/// Samples a block: f32 sums run over one block, and the error estimate comes from the spread of
-/// the blocks. The kernel's `BLOCK`.
+/// Samples a block: f32 sums run over one block, and every batch, whose spread gives the error
+/// estimate, is some of them. The kernel's `BLOCK`.
 pub const BLOCK: u64 = 4;
 
 /// The largest window: what a renderer sums up by itself before the film gets it.
@@ -26,7 +26,7 @@ pub fn window_end(start: u64, end: u64) -> u64 {
 pub struct PixelSums {
     /// Sum of the radiance of all samples, W/(sr m²) per channel.
     pub sum: [f64; 3],
-    /// Sum of the squared deviations of the full blocks' sums from their mean.
+    /// Sum of the squared deviations of the full batches' sums from their mean.
     pub m2: [f64; 3],
 }
 
@@ -37,6 +37,8 @@ pub struct Window {
     pub rect: Rect,
     /// The samples.
     pub samples: Range<u64>,
+    /// Samples of a batch: all batches of a window are of one length.
+    pub batch: u64,
     /// One entry a pixel, rows from the top.
     pub pixels: Vec<PixelSums>,
     /// What else happened.
@@ -44,15 +46,11 @@ pub struct Window {
 }
 
 impl Window {
-    /// The number of blocks that lie in the window as a whole.
+    /// The number of batches that lie in the window as a whole.
     #[must_use]
-    pub fn full_blocks(&self) -> u64 {
-        full_blocks(&self.samples)
+    pub fn full_batches(&self) -> u64 {
+        (self.samples.end / self.batch).saturating_sub(self.samples.start.div_ceil(self.batch))
     }
-}
-
-fn full_blocks(samples: &Range<u64>) -> u64 {
-    (samples.end / BLOCK).saturating_sub(samples.start.div_ceil(BLOCK))
 }
 
 /// Counts over any set of samples.
@@ -97,9 +95,12 @@ pub struct NonFinite {
 pub struct Film {
     rect: Rect,
     samples: u64,
-    blocks: u64,
+    /// Batches, and the samples in them, of windows that have at least two.
+    batches: u64,
+    covered: u64,
     sum: Vec<[f64; 3]>,
-    m2: Vec<[f64; 3]>,
+    /// Estimated variance of the covered samples' sum.
+    variance: Vec<[f64; 3]>,
     tally: Tally,
 }
 
@@ -111,44 +112,42 @@ impl Film {
         Self {
             rect,
             samples: 0,
-            blocks: 0,
+            batches: 0,
+            covered: 0,
             sum: vec![[0.0; 3]; pixels],
-            m2: vec![[0.0; 3]; pixels],
+            variance: vec![[0.0; 3]; pixels],
             tally: Tally::default(),
         }
     }
 
     /// Folds a window in.
     ///
+    /// The n batches of a window are independent and alike, so that n/(n - 1) times the sum of their
+    /// squared deviations estimates the variance of their sum without bias; windows are independent,
+    /// so that these add up, whatever the length of each one's batches.
+    ///
     /// # Panics
     /// If the window is not of the film's pixels.
     pub fn add(&mut self, window: &Window) {
         assert_eq!(window.rect, self.rect, "a window of other pixels");
-        let added = (window.samples.end - window.samples.start) as f64;
-        let blocks = window.full_blocks();
-        // Chan, Golub and LeVeque 1979: M2 = M2a + M2b + (mean_b - mean_a)^2 na nb/(na + nb), here
-        // of block sums, whose mean is BLOCK times the pixel's mean.
-        let (na, nb) = (self.blocks as f64, blocks as f64);
-        let weight = if na + nb > 0.0 {
-            na * nb / (na + nb)
+        let batches = window.full_batches();
+        let scale = if batches > 1 {
+            batches as f64 / (batches - 1) as f64
         } else {
             0.0
         };
-        let scale_a = if self.samples > 0 {
-            BLOCK as f64 / self.samples as f64
-        } else {
-            0.0
-        };
-        let scale_b = BLOCK as f64 / added;
-        for ((sum, m2), pixel) in self.sum.iter_mut().zip(&mut self.m2).zip(&window.pixels) {
+        let pixels = self.sum.iter_mut().zip(&mut self.variance);
+        for ((sum, variance), pixel) in pixels.zip(&window.pixels) {
             for c in 0..3 {
-                let delta = pixel.sum[c] * scale_b - sum[c] * scale_a;
-                m2[c] += pixel.m2[c] + delta * delta * weight;
                 sum[c] += pixel.sum[c];
+                variance[c] += scale * pixel.m2[c];
             }
         }
         self.samples += window.samples.end - window.samples.start;
-        self.blocks += blocks;
+        if batches > 1 {
+            self.batches += batches;
+            self.covered += batches * window.batch;
+        }
         self.tally.add(&window.tally);
     }
 
@@ -177,17 +176,15 @@ impl Film {
         self.sum[i].map(|s| s / n)
     }
 
-    /// The estimated variance of [`mean`](Self::mean), from the spread of the blocks; `None` below
-    /// 16 blocks, where it would be a guess.
+    /// The estimated variance of [`mean`](Self::mean), from the spread of the batches; `None` below
+    /// 16 batches, where it would be a guess. Samples that are in no full batch count as if they were.
     #[must_use]
     pub fn variance_of_mean(&self, i: usize) -> Option<[f64; 3]> {
-        if self.blocks < 16 {
+        if self.batches < 16 {
             return None;
         }
-        // Variance of a block's sum = BLOCK times that of a sample.
-        let blocks = self.blocks as f64;
-        let scale = 1.0 / ((blocks - 1.0) * BLOCK as f64 * self.samples as f64);
-        Some(self.m2[i].map(|m2| m2 * scale))
+        let scale = 1.0 / (self.covered as f64 * self.samples as f64);
+        Some(self.variance[i].map(|v| v * scale))
     }
 
     /// The means as linear f32, rows from the top.

@@ -4,7 +4,7 @@
 //! decided:
 //!
 //! 1. [`cli`]: what was typed.
-//! 2. [`settings`]: what will be rendered, validated.
+//! 2. [`settings`]: what will be rendered, validated. [`sampler`]: which samples are placed together.
 //! 3. [`scene`]: the scene file, validated.
 //! 4. [`placement`]: where everything is, in f64, relative to where the picture is.
 //!    [`lights`]: what light sampling chooses from.
@@ -38,6 +38,7 @@ pub mod output;
 pub mod placement;
 pub mod reference;
 pub mod render;
+pub mod sampler;
 pub mod scene;
 pub mod settings;
 pub mod shader;

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use crate::sampler::Sampler;
 use crate::scene::Scene;
 
 /// Samples a pixel where neither the command line nor the scene says.
@@ -30,6 +31,8 @@ pub struct Settings {
     pub max_bounces: u32,
     /// The estimator.
     pub integrator: Integrator,
+    /// How the random numbers of samples are placed.
+    pub sampler: Sampler,
     /// Whether paths end by Russian roulette on their throughput (`bsdf` only).
     pub roulette: bool,
     /// The form of the geometry in the kernel.
@@ -59,6 +62,7 @@ impl Settings {
             seed: 0,
             max_bounces: scene.render.max_bounces.unwrap_or(DEFAULT_MAX_BOUNCES),
             integrator: Integrator::Path,
+            sampler: Sampler::default(),
             roulette: true,
             geometry: GeometryChoice::Auto,
             offset: Offset::Exact,

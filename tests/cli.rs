@@ -196,7 +196,7 @@ fn the_statistics_say_what_was_done() {
         ("backend", json!("gpu")),
         ("geometry", json!("baked")),
         ("integrator", json!("bsdf")),
-        ("sampler", json!("independent")),
+        ("sampler", json!("sobol")),
         ("max_bounces", json!(5)),
         ("roulette", json!(true)),
         ("samples", json!(10 * 4 * 64)),
@@ -279,7 +279,7 @@ fn quiet_and_verbose() {
         &run.stderr,
         &[
             "device: ",
-            "effects: baked, pole, diffuse, emission, bsdf, roulette",
+            "effects: baked, pole, sobol, diffuse, emission, bsdf, roulette",
         ],
     );
     folder.write("black.toml", BLACK);
@@ -479,7 +479,16 @@ fn whichever_rule_comes_first_ends_the_render() {
         ("--time 0.3", "time", "time is up"),
         ("--time 300ms --error 0.0001%", "time", "time is up"),
         ("--spp 80 --error 0.0001% --time 1h", "spp", "80 spp"),
-        ("--sample-range 8..88 --error 0.0001%", "spp", "80 spp"),
+        (
+            "--sample-range 8..88 --error 0.0001% --sampler independent",
+            "spp",
+            "80 spp",
+        ),
+        (
+            "--sample-range 256..1280 --error 0.0001%",
+            "spp",
+            "1024 spp",
+        ),
     ] {
         let summary = folder.ok(&format!("--size 16x16 {options} -o r.npy --stats r.json"));
         let stats = folder.json("r.json");

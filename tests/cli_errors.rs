@@ -74,7 +74,7 @@ fn options_are_refused_with_their_name_and_the_way_out() {
         --integrator lecture --termination 1 | --termination | as in 0.2
         --integrator lecture --termination -0.1 | --termination | as in 0.2
         --integrator whitted | --integrator | bsdf, lecture
-        --sampler random | --sampler | independent
+        --sampler random | --sampler | sobol, independent
         --roulette maybe | --roulette | on, off
         --backend tpu | --backend | auto, gpu, cpu
         --geometry grid | --geometry | auto, baked, list

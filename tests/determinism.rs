@@ -7,6 +7,7 @@ use common::{U, gpu_renderer, image_bits, means, render_cpu, render_gpu, scene_f
 use gpu_trace::film::Film;
 use gpu_trace::gpu::renderer::DispatchLimits;
 use gpu_trace::render::render_quietly;
+use gpu_trace::sampler::Sampler;
 use gpu_trace::scene::Scene;
 use gpu_trace::settings::{GeometryChoice, Rect, Settings};
 use gpu_trace::statistics::mean_and_error;
@@ -29,7 +30,7 @@ fn the_same_seed_gives_the_same_bits_and_another_gives_others() {
     // The background is the same for all seeds: what has a variance counts.
     let noisy: Vec<usize> = (0..one.crop.pixels())
         .flat_map(|i| {
-            let variance = first.variance_of_mean(i).expect("16 blocks");
+            let variance = first.variance_of_mean(i).expect("16 batches");
             (0..3)
                 .filter(move |c| variance[*c] > 0.0)
                 .map(move |c| 3 * i + c)
@@ -331,6 +332,8 @@ fn sample_indices_go_on_past_32_bits() {
     ] {
         let settings = Settings {
             samples: samples.clone(),
+            // Its batches are short: enough of them for an estimate.
+            sampler: Sampler::Independent,
             ..settings(&scene, 12, 10, 1)
         };
         let film = render_gpu(&scene, &settings);
@@ -342,7 +345,7 @@ fn sample_indices_go_on_past_32_bits() {
             "{samples:?}: {share} of the values differ from the reference's"
         );
         if samples.end - samples.start >= 100 {
-            // The block that ends at the multiple of 2^32 counts.
+            // The batch that ends at the multiple of 2^32 counts.
             for i in 0..settings.crop.pixels() {
                 let (a, b) = (film.variance_of_mean(i), reference.variance_of_mean(i));
                 let (a, b) = (a.expect("enough blocks"), b.expect("enough blocks"));

@@ -9,6 +9,7 @@ use std::fmt::Write as _;
 use common::{scene, scene_file, scene_files};
 use gpu_trace::effects::Effects;
 use gpu_trace::placement::Placement;
+use gpu_trace::sampler::Sampler;
 use gpu_trace::scene::Scene;
 use gpu_trace::settings::{GeometryChoice, Integrator, Offset, Settings};
 use gpu_trace::shader::{Stage, link};
@@ -17,7 +18,7 @@ use rayon::prelude::*;
 type Set = BTreeSet<&'static str>;
 
 /// All effects, in the table's order.
-const ALL: [&str; 21] = [
+const ALL: [&str; 22] = [
     "baked",
     "list",
     "pole",
@@ -27,6 +28,7 @@ const ALL: [&str; 21] = [
     "nudge",
     "ulp",
     "lens",
+    "sobol",
     "diffuse",
     "mirror",
     "dielectric",
@@ -57,13 +59,14 @@ const MATERIALS: [&str; 4] = ["diffuse", "mirror", "dielectric", "reflective"];
 
 /// Effects that must leave no trace in the WGSL where they are not in use, in any case, not even as
 /// a part of a name.
-const WORDS: [&str; 16] = [
+const WORDS: [&str; 17] = [
     "diffuse",
     "mirror",
     "dielectric",
     "priority",
     "reflective",
     "lens",
+    "sobol",
     "environment",
     "emission",
     "roulette",
@@ -210,6 +213,11 @@ fn asking_for(set: &Set) -> (Scene, Settings) {
             Integrator::Bsdf
         },
         roulette: has("roulette"),
+        sampler: if has("sobol") {
+            Sampler::Sobol
+        } else {
+            Sampler::Independent
+        },
         offset: match (has("nudge"), has("ulp")) {
             (true, _) => Offset::Out(1.0e-4),
             (_, true) => Offset::Ulp,
@@ -386,10 +394,12 @@ fn every_possible_set() {
         completed(chosen.map(|(_, n)| *n))
     };
     // Of sets with the rare ones, there are too many to link them all in a minute.
-    let rare = ["straddle", "nested", "nudge", "ulp", "lights", "mis"];
+    let rare = [
+        "straddle", "nested", "nudge", "ulp", "lights", "mis", "sobol",
+    ];
     let common: Vec<&'static str> = ALL.into_iter().filter(|n| !rare.contains(n)).collect();
     let every = (0..1 << common.len()).map(|bits| subset(&common, bits));
-    let some = (0..4000u32).map(|i| subset(&ALL, i.wrapping_mul(0x9e37_79b9) >> 11));
+    let some = (0..4000u32).map(|i| subset(&ALL, i.wrapping_mul(0x9e37_79b9) >> 10));
     let sets: BTreeSet<Set> = every.chain(some).filter(possible).collect();
     eprintln!("{} sets", sets.len());
     check(&sets);

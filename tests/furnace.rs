@@ -136,6 +136,8 @@ fn the_lectures_estimator_has_the_same_mean() {
     let scene = closed(0.5, 1.0);
     let settings = Settings {
         integrator: gpu_trace::settings::Integrator::Lecture { termination: 0.2 },
+        // The variance below is one of independent samples.
+        sampler: gpu_trace::sampler::Sampler::Independent,
         ..settings(&scene, 32, 32, 1024)
     };
     let film = render_gpu(&scene, &settings);

@@ -139,6 +139,7 @@ fn glsl_has_the_same_layouts() {
         "reflective",
         "dielectric",
         "priority",
+        "sobol",
     ];
     for set in 0..1 << optional.len() {
         let chosen = (0..optional.len()).filter(|i| set >> i & 1 == 1);
@@ -218,7 +219,7 @@ fn fixed_structs_agree() {
         fresh,
         step_limit,
         zero,
-        unused,
+        last_of_batch,
     });
     check("Dispatch", &dispatch, &kernel);
     let counters = host!(CountersRecord {

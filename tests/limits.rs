@@ -74,13 +74,14 @@ fn more_bounces_than_a_loop_may_have_in_one_dispatch() {
 fn more_spheres_than_a_loop_may_visit_in_one_dispatch() {
     let scene = scene(&cloud(5000));
     let many = settings(&scene, 16, 16, 32);
-    // The same paths: what differs is rounding at a few silhouettes.
+    // The same paths but for rounding at silhouettes, where some 20 of the 8192 part: a difference with a
+    // standard deviation of sqrt(20) times half the radiance, 7e-4 of the sum, and four of these.
     let (gpu, cpu) = (
         mean(&render_gpu(&scene, &many)),
         mean(&render_cpu(&scene, &many)),
     );
     assert!(
-        (gpu / cpu - 1.0).abs() < 1.0e-3,
+        (gpu / cpu - 1.0).abs() < 2.8e-3,
         "{gpu} on the GPU, {cpu} on the CPU"
     );
 }

@@ -1,5 +1,5 @@
-//! The variance of the estimators in a closed furnace, where it is known; and what is said where it
-//! cannot be known.
+//! The variance of the estimators in a closed furnace, where it is known, for independent samples; and
+//! what is said where it cannot be known.
 //!
 //! In a closed diffuse sphere that emits 1 a sample is a sum of weights, L = W_0 + W_1 + ... with
 //! W_0 = 1 and W_n = w_1 ... w_n, the factors being independent: the direction at a vertex is
@@ -15,6 +15,7 @@ use common::{render_cpu, render_gpu, scene, settings};
 use gpu_trace::estimate::{VarianceClass, variance_class};
 use gpu_trace::film::Film;
 use gpu_trace::placement::Placement;
+use gpu_trace::sampler::Sampler;
 use gpu_trace::scene::Scene;
 use gpu_trace::settings::{Integrator, Settings};
 use gpu_trace::statistics::{mean_and_error, normal_limit};
@@ -93,6 +94,7 @@ fn check(render: impl Fn(&Scene, &Settings) -> Film) {
         let scene = closed(&diffuse(rho));
         let settings = Settings {
             integrator: lecture(p),
+            sampler: Sampler::Independent,
             ..settings(&scene, 64, 64, 256)
         };
         let (variance, error) = measured(&render(&scene, &settings));
@@ -140,7 +142,10 @@ fn roulette_has_its_variance() {
     let limit = normal_limit(all.len());
     for rho in all {
         let scene = closed(&diffuse(rho));
-        let settings = settings(&scene, 64, 64, 256);
+        let settings = Settings {
+            sampler: Sampler::Independent,
+            ..settings(&scene, 64, 64, 256)
+        };
         let (variance, error) = measured(&render_gpu(&scene, &settings));
         let law = with_roulette(rho);
         let z = (variance - law) / error;
@@ -158,6 +163,7 @@ fn no_render_shows_an_infinite_variance() {
     let scene = closed(&diffuse(0.9));
     let settings = Settings {
         integrator: lecture(0.2),
+        sampler: Sampler::Independent,
         ..settings(&scene, 64, 64, 256)
     };
     let (variance, error) = measured(&render_gpu(&scene, &settings));

@@ -7,6 +7,7 @@ use crate::error::Result;
 use crate::estimate::{VarianceClass, variance_class};
 use crate::film::{BLOCK, Film};
 use crate::placement::Placement;
+use crate::sampler::Sampler;
 use crate::scene::Scene;
 use crate::settings::{Integrator, Settings};
 use crate::statistics::mean_and_error;
@@ -375,6 +376,8 @@ fn variance_law(context: &Context) -> Result<Measure> {
         let scene = closed(rho, 1.0, 1.0).load(context)?;
         let settings = Settings {
             integrator: Integrator::Lecture { termination: p },
+            // The law is one of independent samples.
+            sampler: Sampler::Independent,
             ..context.settings(&scene, 64, context.size(64, 512))
         };
         let film = context.render(&scene, &settings)?;

@@ -11,6 +11,7 @@ use super::values;
 use crate::effects::BAKED_MOST;
 use crate::error::{Error, Result};
 use crate::output::ProgressMode;
+use crate::sampler::Sampler;
 use crate::scene::{MAX_BOUNCES, Scene};
 use crate::settings::{
     DEFAULT_TERMINATION, GeometryChoice, Integrator, MAXIMUM_SPP, Offset, Rect, Settings,
@@ -152,11 +153,11 @@ pub struct RenderArgs {
         long,
         value_name = "NAME",
         value_enum,
-        default_value = "independent",
+        default_value = "sobol",
         hide_possible_values = true,
         hide_default_value = true,
         help_heading = "Light transport",
-        help = "Sample placement: independent [default: independent]"
+        help = "Sample placement: sobol (scrambled Sobol' sequences) or independent [default: sobol]"
     )]
     pub sampler: SamplerArg,
     #[arg(
@@ -250,7 +251,7 @@ choices! {
     /// `--integrator`
     IntegratorArg { Path, Bsdf, Nee, Lecture }
     /// `--sampler`
-    SamplerArg { Independent }
+    SamplerArg { Sobol, Independent }
     /// `--roulette`
     OnOff { On, Off }
     /// `--backend`
@@ -335,6 +336,10 @@ impl RenderArgs {
             ));
         }
         settings.roulette = !lecture && self.roulette != Some(OnOff::Off);
+        settings.sampler = match self.sampler {
+            SamplerArg::Independent => Sampler::Independent,
+            SamplerArg::Sobol => Sampler::Sobol,
+        };
         settings.geometry = match self.geometry {
             GeometryArg::Auto => GeometryChoice::Auto,
             GeometryArg::Baked => GeometryChoice::Baked,

@@ -342,7 +342,7 @@ fn statistics(job: &Job, outcome: &Outcome, backend: &str, device: Device) -> St
         effects: effects.names().map(String::from).collect(),
         geometry: effects.geometry().into(),
         integrator: settings.integrator.name().into(),
-        sampler: "independent".into(),
+        sampler: settings.sampler.name().into(),
         max_bounces: settings.max_bounces,
         roulette: settings.roulette,
         seconds: Seconds::default(),

@@ -161,8 +161,8 @@ pub struct DispatchRecord {
     pub step_limit: u32,
     /// Always 0, which no shader compiler knows.
     pub zero: u32,
-    /// Padding.
-    pub unused: u32,
+    /// Samples of a batch minus 1, see [`crate::sampler::Sampler::batch`].
+    pub last_of_batch: u32,
 }
 
 /// `Counters` of `shaders/path.wesl`.

@@ -15,6 +15,7 @@ use crate::gpu::layout::{CameraRecord, CountersRecord, DispatchRecord};
 use crate::gpu::upload::Uploads;
 use crate::placement::Placement;
 use crate::render::{Control, Renderer};
+use crate::sampler::Sampler;
 use crate::scene::Scene;
 use crate::settings::{Integrator, Rect, Settings, stream_words};
 use crate::shader::{Kernel, LOOP_ITERATIONS, Stage, link, ray_steps};
@@ -56,6 +57,7 @@ pub struct GpuRenderer {
     kernel: Kernel,
     crop: Rect,
     seed: u64,
+    sampler: Sampler,
     pipeline: wgpu::ComputePipeline,
     bind_group: wgpu::BindGroup,
     work: wgpu::Buffer,
@@ -195,6 +197,7 @@ impl GpuRenderer {
             kernel,
             crop: settings.crop,
             seed: settings.seed,
+            sampler: settings.sampler,
             pipeline,
             bind_group,
             work,
@@ -304,6 +307,7 @@ impl GpuRenderer {
             window_start: samples.start as u32,
             stream: stream_words(self.seed, (samples.start >> 32) as u32),
             step_limit: self.step_limit,
+            last_of_batch: (self.sampler.batch(samples.start) - 1) as u32,
             ..DispatchRecord::zeroed()
         };
         let mut start = samples.start;
@@ -450,6 +454,7 @@ impl Renderer for GpuRenderer {
     fn render(&mut self, samples: Range<u64>, control: &mut dyn Control) -> Result<Window> {
         let mut window = Window {
             rect: self.crop,
+            batch: self.sampler.batch(samples.start),
             samples,
             pixels: vec![PixelSums::default(); self.crop.pixels()],
             tally: Tally::default(),

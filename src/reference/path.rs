@@ -9,6 +9,7 @@ use super::bsdf::evaluate::evaluate;
 use super::bsdf::sample::bsdf_sample;
 use super::bsdf::scatter::scatter;
 use super::core::random::{random4, sample_key};
+use super::core::sobol::sobol4;
 use super::light::environment_radiance;
 use super::light::sphere::{choose_light, light_density, power_weight, sample_cone};
 use super::scene::camera::camera_ray;
@@ -20,6 +21,7 @@ use crate::film::{BLOCK, NonFinite, PixelSums, Tally, Window};
 use crate::media::Medium;
 use crate::placement::Placement;
 use crate::render::{Control, Renderer};
+use crate::sampler::Sampler;
 use crate::scene::{MaterialKind, Scene};
 use crate::settings::{Integrator, Rect, Settings, stream_words};
 
@@ -66,8 +68,14 @@ impl PathTracer<'_> {
             settings,
         } = self;
         let stream = stream_words(settings.seed, (sample >> 32) as u32);
-        let key = sample_key(stream, pixel, sample as u32);
-        let random = |dimension| random4(key, dimension);
+        let (index, last) = (sample as u32, settings.sampler.batch(sample) as u32 - 1);
+        let random = |dimension| match settings.sampler {
+            Sampler::Independent => random4(sample_key(stream, pixel, index), dimension),
+            Sampler::Sobol => {
+                let key = sample_key(stream, pixel, index & !last);
+                sobol4(key, dimension, index & last, last)
+            }
+        };
         let lecture = matches!(settings.integrator, Integrator::Lecture { .. });
         let mut ray = camera_ray(&placement.camera, pixel, random(0), &placement.within);
         let mut result = PathResult::default();
@@ -244,7 +252,7 @@ impl ReferenceRenderer {
         };
         for sample in samples.clone() {
             let path = tracer.trace(pixel, sample);
-            state.add(pixel, sample, &path);
+            state.add(pixel, sample, &path, self.settings.sampler);
         }
     }
 }
@@ -253,22 +261,22 @@ impl ReferenceRenderer {
 #[derive(Clone, Debug, Default)]
 struct PixelState {
     sums: PixelSums,
-    block: DVec3,
-    in_block: u64,
-    blocks: f64,
-    block_mean: DVec3,
+    batch: DVec3,
+    in_batch: u64,
+    batches: f64,
+    batch_mean: DVec3,
     tally: Tally,
 }
 
 impl PixelState {
-    fn add(&mut self, pixel: [u32; 2], sample: u64, path: &PathResult) {
+    fn add(&mut self, pixel: [u32; 2], sample: u64, path: &PathResult, sampler: Sampler) {
         self.tally.rays += u64::from(path.rays);
         if path.cut.max_element() > 0.0 {
             self.tally.cut_paths += 1;
             self.tally.cut_throughput += path.cut.element_sum() / 3.0;
         }
         if path.radiance.is_finite() {
-            self.block += path.radiance;
+            self.batch += path.radiance;
         } else {
             self.tally.non_finite += 1;
             let place = NonFinite {
@@ -278,24 +286,25 @@ impl PixelState {
             };
             self.tally.first_non_finite = self.tally.first_non_finite.or(Some(place));
         }
-        self.in_block += 1;
-        if (sample + 1).is_multiple_of(BLOCK) {
-            self.end_block();
+        self.in_batch += 1;
+        let length = sampler.batch(sample);
+        if (sample + 1).is_multiple_of(length) {
+            self.end_batch(self.in_batch == length);
         }
     }
 
-    fn end_block(&mut self) {
-        if self.in_block == BLOCK {
+    fn end_batch(&mut self, full: bool) {
+        if full {
             // Welford 1962.
-            self.blocks += 1.0;
-            let delta = self.block - self.block_mean;
-            self.block_mean += delta / self.blocks;
-            let m2 = delta * (self.block - self.block_mean);
+            self.batches += 1.0;
+            let delta = self.batch - self.batch_mean;
+            self.batch_mean += delta / self.batches;
+            let m2 = delta * (self.batch - self.batch_mean);
             self.sums.m2 = (DVec3::from(self.sums.m2) + m2).to_array();
         }
-        self.sums.sum = (DVec3::from(self.sums.sum) + self.block).to_array();
-        self.block = DVec3::ZERO;
-        self.in_block = 0;
+        self.sums.sum = (DVec3::from(self.sums.sum) + self.batch).to_array();
+        self.batch = DVec3::ZERO;
+        self.in_batch = 0;
     }
 }
 
@@ -341,12 +350,13 @@ impl Renderer for ReferenceRenderer {
         }
         let mut tally = Tally::default();
         for pixel in &mut state {
-            pixel.end_block();
+            pixel.end_batch(false);
             tally.add(&pixel.tally);
         }
         Ok(Window {
             rect: crop,
             samples: samples.start..start,
+            batch: self.settings.sampler.batch(samples.start),
             pixels: state.into_iter().map(|s| s.sums).collect(),
             tally,
         })

@@ -14,6 +14,7 @@ sources![
     "probe",
     "core/random",
     "core/sampling",
+    "core/sobol",
     "core/sum",
     "scene/ray",
     "scene/sphere",
