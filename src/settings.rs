@@ -61,7 +61,7 @@ impl Settings {
             samples: 0..scene.render.spp.unwrap_or(DEFAULT_SPP),
             seed: 0,
             max_bounces: scene.render.max_bounces.unwrap_or(DEFAULT_MAX_BOUNCES),
-            integrator: Integrator::Path,
+            integrator: Integrator::Bsdf,
             sampler: Sampler::default(),
             roulette: true,
             geometry: GeometryChoice::Auto,

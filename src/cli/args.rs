@@ -142,11 +142,11 @@ pub struct RenderArgs {
         long,
         value_name = "NAME",
         value_enum,
-        default_value = "path",
+        default_value = "bsdf",
         hide_possible_values = true,
         hide_default_value = true,
         help_heading = "Light transport",
-        help = "Estimator: path (BSDF and light sampling), bsdf, nee (light sampling alone), or lecture (uniform hemisphere, constant p) [default: path]"
+        help = "Estimator: path (BSDF and light sampling), bsdf, nee (light sampling alone), or lecture (uniform hemisphere, constant p) [default: bsdf]"
     )]
     pub integrator: IntegratorArg,
     #[arg(
@@ -249,7 +249,7 @@ choices! {
     /// `--progress`
     ProgressArg { Auto, Plain, Json, None }
     /// `--integrator`
-    IntegratorArg { Path, Bsdf, Nee, Lecture }
+    IntegratorArg { Bsdf, Lecture, Path, Nee }
     /// `--sampler`
     SamplerArg { Sobol, Independent }
     /// `--roulette`
