@@ -80,9 +80,9 @@ fn cone_directions_are_uniform() {
             assert!((f64::from(output[3]) / density - 1.0).abs() < 1.0e-4);
         }
         p_values.push(chi_square(&counts, &[1.0 / 256.0; 256]).p);
-        // Companion: 10 % more in one row of cells.
+        // Companion: 20 % more in one row of cells.
         for count in &mut counts[..16] {
-            *count += *count / 10;
+            *count += *count / 5;
         }
         assert!(chi_square(&counts, &[1.0 / 256.0; 256]).p < 1.0e-4);
     }
@@ -212,7 +212,10 @@ fn light_sampling_is_worth_it() {
     scene.spheres.retain(|s| s.center.x != 1.2);
     let error = |integrator| {
         let film = rendered(&scene, integrator, 256);
-        let all = (0..film.rect().pixels()).map(|i| film.variance_of_mean(i).expect("blocks"));
+        // Where a lamp itself is seen, its outline is all the variance.
+        let dim = |i: &usize| film.mean(*i).iter().all(|c| *c < 2.0);
+        let pixels = (0..film.rect().pixels()).filter(dim);
+        let all = pixels.map(|i| film.variance_of_mean(i).expect("blocks"));
         all.flatten().sum::<f64>()
     };
     let (path, bsdf) = (error(Integrator::Path), error(Integrator::Bsdf));
