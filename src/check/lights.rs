@@ -12,7 +12,8 @@ use crate::scene::Scene;
 use crate::settings::Settings;
 use crate::statistics::normal_limit;
 
-const NO_LIGHT_SAMPLING: &str = "no light sampling: lights are found by BSDF sampling";
+const NO_LIGHT_SAMPLING: &str =
+    "light sampling is not the default; measured by tests/lights.rs so far";
 
 pub(super) const CASES: &[Case] = &[
     Case {
