@@ -128,12 +128,6 @@ impl Measure {
     pub fn passes(&self) -> bool {
         self.trials > 0 && self.failures == 0
     }
-
-    /// Trials so far.
-    #[must_use]
-    pub fn trials(&self) -> u64 {
-        self.trials
-    }
 }
 
 /// What became of a case.
