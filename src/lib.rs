@@ -12,7 +12,7 @@
 //! 5. [`effects`]: what the scene asks for; nothing else goes into the kernel.
 //! 6. [`shader`]: the kernel, linked for these effects from `shaders/`.
 //! 7. [`gpu`] and [`reference`](mod@reference): two renderers, wgpu in f32 and the CPU in f64, that
-//!    trace the same paths.
+//!    trace the same paths. [`backend`]: one of them, opened.
 //! 8. [`render`]: the loop that asks a renderer for windows of samples until a stop rule holds.
 //! 9. [`film`]: f64 sums and variances over all windows.
 //! 10. [`estimate`]: mean and error.
@@ -22,6 +22,7 @@
 //! [`check`] measures the hard cases of all this on a device, with the tests of [`statistics`].
 //! [`error`] is what can go wrong anywhere.
 
+pub mod backend;
 pub mod check;
 pub mod cli;
 pub mod compare;

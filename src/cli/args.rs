@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 
+use super::device::Choice;
 use super::fault::Fault;
 use super::values;
 use crate::effects::BAKED_MOST;
@@ -267,6 +268,15 @@ impl RenderArgs {
             .as_deref()
             .map(Path::new)
             .filter(|path| path.is_file())
+    }
+
+    /// What should render.
+    pub(super) fn device_choice(&self) -> Choice<'_> {
+        Choice {
+            backend: self.backend,
+            device: self.device.as_deref(),
+            threads: self.threads,
+        }
     }
 
     /// How progress is shown.

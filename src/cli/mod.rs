@@ -3,9 +3,11 @@
 mod args;
 mod check;
 mod compare;
+mod device;
 mod devices;
 mod effects;
 mod fault;
+mod format;
 mod render;
 mod scene;
 mod shell;

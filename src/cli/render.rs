@@ -3,26 +3,27 @@
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use super::args::{BackendArg, RenderArgs};
+use super::args::RenderArgs;
+use super::device::open;
 use super::fault::Faulty;
+use super::format::{percent, significant};
 use super::signals::Signals;
 use super::{derive, print};
+use crate::backend::{Backend, LEAST_PIXEL_BYTES, check_memory};
 use crate::effects::Effects;
 use crate::error::{Error, Result};
 use crate::estimate::{VarianceClass, VarianceReport, energy_cut_at_most, variance_class};
 use crate::film::NonFinite;
-use crate::gpu::device::{self, DRIVER_ADVICE, DeviceChoice, Gpu};
-use crate::gpu::renderer::GpuRenderer;
+use crate::gpu::device::Gpu;
 use crate::output::stats::{BounceLimit, Device, Seconds};
 use crate::output::{
     Contents, Picture, Progress, Snapshot, Stats, Target, atomic, check_all, write_all,
 };
 use crate::placement::Placement;
-use crate::reference::path::ReferenceRenderer;
 use crate::render::{Outcome, Renderer, Status, StoppedBy, Watch, render};
 use crate::scene::builtin;
 use crate::scene::load::Loaded;
-use crate::settings::{MAXIMUM_SPP, Rect, Settings};
+use crate::settings::{MAXIMUM_SPP, Settings};
 use crate::shader::{Stage, link};
 
 /// Everything about a render that is decided before a device is touched.
@@ -46,18 +47,17 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
     warnings.extend(job.variance.warning.clone());
     warnings.extend(left_out(&job.placement));
     let opening = Instant::now();
-    let gpu = open(args, &mut warnings)?;
+    let backend = open(&args.device_choice(), &mut warnings)?;
     let opened = opening.elapsed();
     if let Some(path) = &args.dump_wgsl {
         let kernel = link(Stage::Path, &job.loaded.scene, &job.placement, &job.effects)?;
         write_file(path, kernel.wgsl.as_bytes())?;
     }
-    let backend = if gpu.is_some() { "gpu" } else { "cpu" };
     let compiling = Instant::now();
-    let mut renderer = renderer(gpu, args, &job)?;
+    let mut renderer = renderer(&backend, args, &job)?;
     let compile = match backend {
-        "gpu" => compiling.elapsed(),
-        _ => Duration::ZERO,
+        Backend::Gpu(_) => compiling.elapsed(),
+        Backend::Cpu { .. } => Duration::ZERO,
     };
     let setup = begin.elapsed().saturating_sub(compile);
     let (name, interface, driver) = renderer.device();
@@ -89,7 +89,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
     let stats = statistics(
         &job,
         &outcome,
-        backend,
+        backend.name(),
         Device {
             name,
             backend: interface,
@@ -178,7 +178,7 @@ fn prepare(args: &RenderArgs) -> Result<Job> {
     outputs.extend(args.stats.as_deref());
     outputs.extend(args.dump_wgsl.as_deref());
     check_all(&outputs, args.scene_file().as_slice())?;
-    check_memory(&settings.crop, PIXEL_BYTES)?;
+    check_memory(&settings.crop, LEAST_PIXEL_BYTES)?;
     let (placement, effects) = derive(&loaded.scene, &settings)?;
     let variance = variance_class(&loaded.scene, &placement, &settings);
     Ok(Job {
@@ -205,75 +205,18 @@ fn render_job(renderer: &mut dyn Renderer, job: &Job, watch: &mut dyn Watch) -> 
     outcome
 }
 
-/// Bytes of memory that a pixel takes: 48 each in film and window, and room for the files.
-const PIXEL_BYTES: usize = 128;
-/// The same with the CPU reference, whose sums in the middle of a window are larger.
-const CPU_PIXEL_BYTES: usize = 256;
-
-/// Refuses an image that would end the program in the middle for want of memory.
-fn check_memory(crop: &Rect, pixel_bytes: usize) -> Result<()> {
-    let bytes = crop.pixels().saturating_mul(pixel_bytes);
-    let mut room: Vec<u8> = Vec::new();
-    let there = room.try_reserve_exact(bytes).is_ok();
-    // Without this, the compiler may leave the allocation out and assume that it works.
-    std::hint::black_box(&room);
-    if there {
-        return Ok(());
-    }
-    Err(Error::Usage(format!(
-        "{}x{} pixels need {} GiB of memory, more than there is: choose a smaller --size, or \
-         render parts of the image with --crop",
-        crop.width,
-        crop.height,
-        significant(bytes as f64 / f64::from(1 << 30)),
-    )))
-}
-
-/// The GPU to render on; `None` for the CPU reference.
-fn open(args: &RenderArgs, warnings: &mut Vec<String>) -> Result<Option<Gpu>> {
-    if args.backend == BackendArg::Cpu {
-        return Ok(None);
-    }
-    let choice = args
-        .device
-        .as_deref()
-        .map_or(DeviceChoice::Best, |text| text.parse().unwrap_or_default());
-    match device::open(&choice) {
-        Ok(gpu) => Ok(Some(gpu)),
-        // The user named it, so the user can name another.
-        Err(Error::Device(text)) if args.device.is_some() => {
-            Err(Error::Usage(format!("--device: {text}")))
-        }
-        Err(error) if args.backend == BackendArg::Gpu => Err(error),
-        Err(_) => {
-            warnings.push(format!(
-                "no usable GPU driver: rendering on the CPU reference, which is slower; {DRIVER_ADVICE}"
-            ));
-            Ok(None)
-        }
-    }
-}
-
-fn renderer(gpu: Option<Gpu>, args: &RenderArgs, job: &Job) -> Result<Box<dyn Renderer>> {
-    let (scene, placement, settings) = (&job.loaded.scene, &job.placement, &job.settings);
-    let device = gpu.clone().filter(|_| args.inject_fault.is_some());
-    let (renderer, pixel_bytes): (Box<dyn Renderer>, _) = match gpu {
-        Some(gpu) => {
-            let renderer = GpuRenderer::new(gpu, scene, placement, &job.effects, settings)?;
-            (Box::new(renderer), PIXEL_BYTES)
-        }
-        None => {
-            let threads = args.threads.map_or(0, usize::from);
-            let renderer = ReferenceRenderer::new(scene, placement, settings, threads)?;
-            (Box::new(renderer), CPU_PIXEL_BYTES)
-        }
+/// A renderer for the job, which fails as `--inject-fault` says.
+fn renderer(backend: &Backend, args: &RenderArgs, job: &Job) -> Result<Box<dyn Renderer>> {
+    let scene = &job.loaded.scene;
+    let renderer = backend.renderer(scene, &job.placement, &job.effects, &job.settings)?;
+    let Some(fault) = args.inject_fault else {
+        return Ok(renderer);
     };
-    // Again, after the driver has taken its part.
-    check_memory(&settings.crop, pixel_bytes)?;
-    Ok(match args.inject_fault {
-        Some(fault) => Box::new(Faulty::new(renderer, device, fault)?),
-        None => renderer,
-    })
+    let device = match backend {
+        Backend::Gpu(gpu) => Some(Gpu::clone(gpu)),
+        Backend::Cpu { .. } => None,
+    };
+    Ok(Box::new(Faulty::new(renderer, device, fault)?))
 }
 
 /// Spheres of the scene that are not rendered, though nothing is wrong with them.
@@ -438,25 +381,6 @@ fn summary(job: &Job, stats: &Stats) -> String {
         significant(stats.paths_per_second * 1.0e-6),
         stats.device.name,
     )
-}
-
-/// A fraction as percent with three digits.
-fn percent(fraction: f64) -> String {
-    format!("{} %", significant(100.0 * fraction))
-}
-
-/// Three significant digits, in plain notation where that is short.
-fn significant(value: f64) -> String {
-    let digits = if value > 0.0 {
-        2 - value.log10().floor() as i32
-    } else {
-        0
-    };
-    if digits > 8 {
-        format!("{value:.2e}")
-    } else {
-        format!("{value:.*}", digits.max(0) as usize)
-    }
 }
 
 fn write_file(path: &Path, bytes: &[u8]) -> Result<()> {

@@ -9,7 +9,8 @@ use clap::{Args, ValueEnum};
 use serde::Serialize;
 use serde_json::json;
 
-use self::text::{figures, heading, legend, percent};
+use self::text::{figures, heading, legend};
+use super::format::percent;
 use super::{print, values};
 use crate::compare::{DEFAULT_PPD, HeatMap, Options, Report, check_same, compare};
 use crate::error::{Error, Result};
