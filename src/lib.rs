@@ -16,6 +16,7 @@
 //! 8. [`render`]: the loop that asks a renderer for windows of samples until a stop rule holds.
 //! 9. [`film`]: f64 sums and variances over all windows.
 //! 10. [`estimate`]: mean and error. [`forecast`]: what an error will cost, from a pilot.
+//!     [`ledger`]: how much light inexact settings took.
 //! 11. [`output`]: images, statistics, progress.
 //! 12. [`input`] and [`compare`](mod@compare): images of any origin, and how far two are apart.
 //!
@@ -34,6 +35,7 @@ pub mod film;
 pub mod forecast;
 pub mod gpu;
 pub mod input;
+pub mod ledger;
 pub mod lights;
 pub mod media;
 pub mod output;

@@ -28,9 +28,9 @@ Examples:
   gpu-trace price my.toml --time 10m           the error that ten minutes buy
   gpu-trace price glass --backends gpu,cpu     on both
 
-Seconds are those of rendering alone: setup and compilation are given apart. The interval holds 95 %
-of such renders, as far as the pilot can tell: light that it has not seen, as of a rare caustic, is in
-neither figure.";
+Seconds are those of rendering alone: setup and compilation are given apart. The interval holds
+95 % of such renders, as far as the pilot can tell: light that it has not seen, as of a rare
+caustic, is in neither figure.";
 
 /// The errors of the table.
 const ERRORS: [f64; 5] = [0.05, 0.02, 0.01, 0.005, 0.001];
@@ -43,6 +43,8 @@ const ERRORS: [f64; 5] = [0.05, 0.02, 0.01, 0.005, 0.001];
     mut_arg("exposure", |a| a.hide(true)),
     mut_arg("dump_wgsl", |a| a.hide(true)),
     mut_arg("allow_non_finite", |a| a.hide(true)),
+    mut_arg("progress", |a| a.hide(true)),
+    mut_arg("verbose", |a| a.hide(true)),
     mut_arg("error", |a| a.help("Only this error: 1% or 0.01")),
     mut_arg("time", |a| a.help("The error that this time buys: 30s, 2m, 1h")),
     mut_arg("spp", |a| a.help("The error and time of so many samples a pixel")),
