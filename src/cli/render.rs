@@ -18,7 +18,8 @@ use crate::gpu::device::Gpu;
 use crate::ledger::{self, Entry};
 use crate::output::stats::{BounceLimit, Device, Seconds};
 use crate::output::{
-    Contents, Picture, Progress, Snapshot, Stats, Target, atomic, check_all, write_all,
+    Aov, Contents, Format, Layer, Picture, Plane, Progress, Snapshot, Stats, Target, atomic,
+    check_all, write_all,
 };
 use crate::placement::Placement;
 use crate::render::{Outcome, Renderer, Status, StoppedBy, Watch, render};
@@ -84,6 +85,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
     let auditing = auditing.elapsed();
 
     warnings.extend(observations(&outcome, &job.settings));
+    warnings.extend(no_stderr(args, &outcome));
     if args.allow_non_finite {
         warnings.extend(not_finite(&outcome));
     }
@@ -180,6 +182,11 @@ fn prepare(args: &RenderArgs) -> Result<Job> {
             .map(Target::parse)
             .collect::<Result<_>>()?
     };
+    if !args.aov.is_empty() && !targets.iter().any(|t| t.format == Format::Exr) {
+        return Err(Error::Usage(
+            "--aov: only EXR files have room for layers: add an output such as -o image.exr".into(),
+        ));
+    }
     let mut outputs: Vec<&Path> = targets.iter().map(|t| t.path.as_path()).collect();
     outputs.extend(args.stats.as_deref());
     outputs.extend(args.dump_wgsl.as_deref());
@@ -289,6 +296,13 @@ fn observations(outcome: &Outcome, settings: &Settings) -> Vec<String> {
     said
 }
 
+/// What to say where standard errors were asked for and are unknown.
+fn no_stderr(args: &RenderArgs, outcome: &Outcome) -> Option<String> {
+    let asked = args.aov.contains(&Aov::Stderr) && outcome.film.samples() > 0;
+    let unknown = asked && Plane::stderr_unknown(&outcome.film, &outcome.estimate);
+    unknown.then(|| "the standard errors are unknown: the layer stderr holds no numbers".to_owned())
+}
+
 fn statistics(job: &Job, outcome: &Outcome, backend: &str, device: Device) -> Stats {
     let Job {
         loaded,
@@ -322,6 +336,7 @@ fn statistics(job: &Job, outcome: &Outcome, backend: &str, device: Device) -> St
         paths_per_second: samples as f64 / outcome.elapsed.as_secs_f64(),
         rays: tally.rays,
         estimated_error: outcome.estimate.error,
+        degrees_of_freedom: outcome.estimate.error.and_then(|_| film.freedom()),
         variance: job.variance.class,
         black: outcome.estimate.is_black(),
         non_finite: tally.non_finite,
@@ -348,9 +363,15 @@ fn finish(args: &RenderArgs, job: &Job, outcome: &Outcome, stats: &Stats) -> Res
     }
     let crop = job.settings.crop;
     let picture = Picture::new(crop.width, crop.height, outcome.film.pixels());
+    let planes: Vec<Plane> = args
+        .aov
+        .iter()
+        .map(|aov| Plane::of(*aov, &outcome.film, &outcome.estimate))
+        .collect();
+    let layers: Vec<Layer<'_>> = planes.iter().map(Plane::layer).collect();
     let contents = Contents {
         picture: &picture,
-        layers: &[],
+        layers: &layers,
         metadata: &stats.metadata(),
         exposure: args.exposure,
     };

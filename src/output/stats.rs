@@ -58,6 +58,9 @@ pub struct Stats {
     pub rays: u64,
     /// The relative error, a fraction; `null` where unknown.
     pub estimated_error: Option<f64>,
+    /// Degrees of freedom of the pixels' standard errors, for Student's t; `null` where these are
+    /// unknown.
+    pub degrees_of_freedom: Option<f64>,
     /// Whether the variance, and with it the error, is one that samples can show: `finite`,
     /// `heavy-tailed`, or `infinite`, where the error is unknown.
     pub variance: VarianceClass,
@@ -144,7 +147,7 @@ impl Stats {
     #[must_use]
     pub fn metadata(&self) -> Metadata {
         let [start, end] = self.sample_range;
-        Metadata::new()
+        let metadata = Metadata::new()
             .with("version", self.version.as_str())
             .with("scene", self.scene.as_str())
             .with("scene_hash", self.scene_hash.as_str())
@@ -156,6 +159,10 @@ impl Stats {
             .with("max_bounces", self.max_bounces)
             .with("device", self.device.name.as_str())
             .with("backend", self.device.backend.as_str())
-            .with("seconds", self.seconds.total)
+            .with("seconds", self.seconds.total);
+        match self.degrees_of_freedom {
+            Some(freedom) => metadata.with("degrees_of_freedom", freedom),
+            None => metadata,
+        }
     }
 }
