@@ -15,13 +15,14 @@
 //!    trace the same paths. [`backend`]: one of them, opened.
 //! 8. [`render`]: the loop that asks a renderer for windows of samples until a stop rule holds.
 //! 9. [`film`]: f64 sums and variances over all windows.
-//! 10. [`estimate`]: mean and error.
+//! 10. [`estimate`] and [`allocation`]: mean and error; where further samples go.
 //! 11. [`output`]: images, statistics, progress.
 //! 12. [`input`] and [`compare`](mod@compare): images of any origin, and how far two are apart.
 //!
 //! [`check`] measures the hard cases of all this on a device, with the tests of [`statistics`].
 //! [`error`] is what can go wrong anywhere.
 
+pub mod allocation;
 pub mod backend;
 pub mod check;
 pub mod cli;
@@ -33,6 +34,7 @@ pub mod estimate;
 pub mod film;
 pub mod gpu;
 pub mod input;
+pub mod intervals;
 pub mod lights;
 pub mod media;
 pub mod output;
