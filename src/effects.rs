@@ -153,6 +153,11 @@ impl Effects {
                 reasons: when(settings.sampler == Sampler::Sobol, "sampler sobol".into()),
             },
             Effect {
+                name: "adaptive",
+                what: "samples of some tiles of the image only",
+                reasons: when(settings.adaptive, "--adaptive".into()),
+            },
+            Effect {
                 name: "diffuse",
                 what: "Lambert's law",
                 reasons: kind(&|k| matches!(k, MaterialKind::Diffuse { .. })),

@@ -76,8 +76,7 @@ pub fn energy_cut_at_most(scene: &Scene, film: &Film) -> Option<f64> {
     if albedo >= 1.0 || estimate.is_black() {
         return None;
     }
-    let paths = film.samples() as f64 * film.rect().pixels() as f64;
-    let removed = tally.cut_throughput / paths * albedo * emitted / (1.0 - albedo);
+    let removed = tally.cut_throughput / film.paths() as f64 * albedo * emitted / (1.0 - albedo);
     Some(removed / estimate.mean)
 }
 

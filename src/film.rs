@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
+use crate::allocation::Allocation;
 use crate::settings::Rect;
-use crate::statistics::student_quantile;
 
 /// Samples a block: f32 sums run over one block, and every batch, whose spread gives the error
 /// estimate, is some of them. The kernel's `BLOCK`.
@@ -13,13 +13,24 @@ pub const BLOCK: u64 = 4;
 pub const WINDOW: u64 = 256;
 
 /// The end of the window that starts at `start`, in a range that ends at `end`. Boundaries are at
-/// fixed sample indices (16, 64, 256 and then every 256), so that no timing changes any sum.
+/// fixed sample indices (16, 64, 128, 256 and then every 256), so that no timing changes any sum.
 #[must_use]
 pub fn window_end(start: u64, end: u64) -> u64 {
-    let boundary = [16, 64].into_iter().find(|b| start < *b);
+    let boundary = [16, 64, 128].into_iter().find(|b| start < *b);
     let boundary = boundary.unwrap_or((start / WINDOW + 1).saturating_mul(WINDOW));
     // A window's samples share the high word of the sample index.
     boundary.min(end)
+}
+
+/// Samples below which no render stops by its error.
+pub const LEAST_SAMPLES: u64 = 64;
+
+/// The number of samples at which the error is looked at next, after a look at `samples`: a quarter
+/// more. Every look is a chance to stop by luck, so that there should be few (numerics: geometric
+/// check times); what it costs is a render that is an eighth too long on average.
+#[must_use]
+pub fn next_look(samples: u64) -> u64 {
+    LEAST_SAMPLES.max(samples.saturating_add(samples / 4))
 }
 
 /// One pixel's share of a window.
@@ -40,7 +51,7 @@ pub struct Window {
     pub samples: Range<u64>,
     /// Samples of a batch: all batches of a window are of one length.
     pub batch: u64,
-    /// One entry a pixel, rows from the top.
+    /// One entry a pixel, rows from the top; zeros where a tile was not asked for.
     pub pixels: Vec<PixelSums>,
     /// What else happened.
     pub tally: Tally,
@@ -94,37 +105,71 @@ pub struct NonFinite {
 /// Sums over all samples so far.
 #[derive(Clone, Debug)]
 pub struct Film {
-    rect: Rect,
+    allocation: Allocation,
+    /// By step.
+    levels: Vec<Level>,
+    sum: Vec<[f64; 3]>,
+    /// Estimated variance of the covered samples' sum.
+    variance: Vec<[f64; 3]>,
+    tally: Tally,
+    /// The paths that the tally is of.
+    paths: u64,
+}
+
+/// What the pixels of one step of the allocation have.
+#[derive(Clone, Debug, Default)]
+struct Level {
+    pixels: u64,
     samples: u64,
     /// Batches, and the samples in them, of windows that have at least two.
     batches: u64,
     covered: u64,
     /// Of these windows: the samples in their batches squared, over one less than the batches.
     doubt: f64,
-    sum: Vec<[f64; 3]>,
-    /// Estimated variance of the covered samples' sum.
-    variance: Vec<[f64; 3]>,
-    tally: Tally,
+}
+
+impl Level {
+    /// See [`Film::freedom`].
+    fn freedom(&self) -> Option<f64> {
+        (self.batches >= 16).then(|| (self.covered as f64).powi(2) / self.doubt)
+    }
 }
 
 impl Film {
-    /// An empty film for the pixels of `rect`.
+    /// An empty film for the pixels of `rect`, which all get the same samples.
     #[must_use]
     pub fn new(rect: Rect) -> Self {
-        let pixels = rect.pixels();
+        Self::of(Allocation::uniform(rect))
+    }
+
+    /// An empty film for samples as `allocation` has it.
+    #[must_use]
+    pub fn of(allocation: Allocation) -> Self {
+        let pixels = allocation.rect().pixels();
+        let level = |pixels| Level {
+            pixels,
+            ..Level::default()
+        };
         Self {
-            rect,
-            samples: 0,
-            batches: 0,
-            covered: 0,
-            doubt: 0.0,
+            levels: allocation.counts().into_iter().map(level).collect(),
+            allocation,
             sum: vec![[0.0; 3]; pixels],
             variance: vec![[0.0; 3]; pixels],
             tally: Tally::default(),
+            paths: 0,
         }
     }
 
-    /// Folds a window in.
+    /// Folds a window of all pixels in, as [`add_to`](Self::add_to) does.
+    ///
+    /// # Panics
+    /// If the window is not of the film's pixels, or these get different samples.
+    pub fn add(&mut self, window: &Window) {
+        assert_eq!(self.levels.len(), 1, "a window of one of several steps");
+        self.add_to(0, window);
+    }
+
+    /// Folds a window of the pixels of `step` in.
     ///
     /// The n batches of a window are independent and alike, so that n/(n - 1) times the sum of their
     /// squared deviations estimates the variance of their sum without bias; windows are independent,
@@ -132,41 +177,93 @@ impl Film {
     ///
     /// # Panics
     /// If the window is not of the film's pixels.
-    pub fn add(&mut self, window: &Window) {
-        assert_eq!(window.rect, self.rect, "a window of other pixels");
+    pub fn add_to(&mut self, step: u8, window: &Window) {
+        let rect = self.rect();
+        assert_eq!(window.rect, rect, "a window of other pixels");
         let batches = window.full_batches();
         let scale = if batches > 1 {
             batches as f64 / (batches - 1) as f64
         } else {
             0.0
         };
-        let pixels = self.sum.iter_mut().zip(&mut self.variance);
-        for ((sum, variance), pixel) in pixels.zip(&window.pixels) {
+        for (i, pixel) in window.pixels.iter().enumerate() {
+            if self.allocation.step(i) != step {
+                continue;
+            }
             for c in 0..3 {
-                sum[c] += pixel.sum[c];
-                variance[c] += scale * pixel.m2[c];
+                self.sum[i][c] += pixel.sum[c];
+                self.variance[i][c] += scale * pixel.m2[c];
             }
         }
-        self.samples += window.samples.end - window.samples.start;
+        let level = &mut self.levels[usize::from(step)];
+        let samples = window.samples.end - window.samples.start;
+        level.samples += samples;
         if batches > 1 {
-            self.batches += batches;
             let covered = batches * window.batch;
-            self.covered += covered;
-            self.doubt += (covered as f64).powi(2) / (batches - 1) as f64;
+            level.batches += batches;
+            level.covered += covered;
+            level.doubt += (covered as f64).powi(2) / (batches - 1) as f64;
         }
-        self.tally.add(&window.tally);
+        let paths = samples * level.pixels;
+        self.count(&window.tally, paths);
+    }
+
+    /// Takes note of what happened on `paths` more paths, whose light is not in this film.
+    pub fn count(&mut self, tally: &Tally, paths: u64) {
+        self.tally.add(tally);
+        self.paths += paths;
     }
 
     /// The film's pixels.
     #[must_use]
     pub fn rect(&self) -> Rect {
-        self.rect
+        self.allocation.rect()
     }
 
-    /// Samples a pixel so far.
+    /// How samples are shared out.
+    #[must_use]
+    pub fn allocation(&self) -> &Allocation {
+        &self.allocation
+    }
+
+    /// Samples a pixel so far, of the pixels that have fewest: all, where they get the same.
     #[must_use]
     pub fn samples(&self) -> u64 {
-        self.samples
+        self.present().map(|l| l.samples).min().unwrap_or(0)
+    }
+
+    /// Samples of the pixels that have most.
+    #[must_use]
+    pub fn most_samples(&self) -> u64 {
+        self.present().map(|l| l.samples).max().unwrap_or(0)
+    }
+
+    /// Samples a pixel on average.
+    #[must_use]
+    pub fn mean_samples(&self) -> f64 {
+        let all: u64 = self.present().map(|l| l.samples * l.pixels).sum();
+        all as f64 / self.rect().pixels() as f64
+    }
+
+    /// Samples of pixel `i`.
+    #[must_use]
+    pub fn samples_of(&self, i: usize) -> u64 {
+        self.level(i).samples
+    }
+
+    /// The number of steps of the allocation.
+    #[must_use]
+    pub fn steps(&self) -> u8 {
+        self.levels.len() as u8
+    }
+
+    /// Levels that pixels have.
+    fn present(&self) -> impl Iterator<Item = &Level> {
+        self.levels.iter().filter(|l| l.pixels > 0)
+    }
+
+    fn level(&self, i: usize) -> &Level {
+        &self.levels[usize::from(self.allocation.step(i))]
     }
 
     /// Counts over all samples so far.
@@ -175,10 +272,16 @@ impl Film {
         &self.tally
     }
 
+    /// The paths that the tally is of.
+    #[must_use]
+    pub fn paths(&self) -> u64 {
+        self.paths
+    }
+
     /// The mean radiance of pixel `i`, W/(sr m²) per channel; zero without samples.
     #[must_use]
     pub fn mean(&self, i: usize) -> [f64; 3] {
-        let n = self.samples.max(1) as f64;
+        let n = self.samples_of(i).max(1) as f64;
         self.sum[i].map(|s| s / n)
     }
 
@@ -186,29 +289,31 @@ impl Film {
     /// 16 batches, where it would be a guess. Samples that are in no full batch count as if they were.
     #[must_use]
     pub fn variance_of_mean(&self, i: usize) -> Option<[f64; 3]> {
-        if self.batches < 16 {
+        let level = self.level(i);
+        if level.batches < 16 {
             return None;
         }
-        let scale = 1.0 / (self.covered as f64 * self.samples as f64);
+        let scale = 1.0 / (level.covered as f64 * level.samples as f64);
         Some(self.variance[i].map(|v| v * scale))
     }
 
-    /// The degrees of freedom of [`variance_of_mean`](Self::variance_of_mean); `None` where that is.
+    /// The degrees of freedom of [`variance_of_mean`](Self::variance_of_mean), where these are fewest;
+    /// `None` if that is `None` anywhere.
     ///
     /// Welch 1947 and Satterthwaite 1946, with one variance a sample throughout. Longer scrambles have
     /// less, so that the windows with few and long batches weigh less than this has it: it is on the
     /// cautious side.
     #[must_use]
     pub fn freedom(&self) -> Option<f64> {
-        (self.batches >= 16).then(|| (self.covered as f64).powi(2) / self.doubt)
+        self.present()
+            .map(Level::freedom)
+            .reduce(|a, b| Some(a?.min(b?)))?
     }
 
-    /// Half the width of the interval about [`mean`](Self::mean) that holds the truth in 95 % of all
-    /// renders (Student 1908); `None` below 16 batches. `docs/accuracy.md` says how far that is true.
+    /// The same of pixel `i`.
     #[must_use]
-    pub fn half_width(&self, i: usize) -> Option<[f64; 3]> {
-        let t = student_quantile(self.freedom()?, 0.95);
-        self.variance_of_mean(i).map(|v| v.map(|v| t * v.sqrt()))
+    pub fn freedom_of(&self, i: usize) -> Option<f64> {
+        self.level(i).freedom()
     }
 
     /// The means as linear f32, rows from the top.

@@ -84,8 +84,7 @@ pub fn audit(
     film: &Film,
     go_on: &dyn Fn() -> bool,
 ) -> Result<Vec<Entry>> {
-    let paths = film.samples() * settings.crop.pixels() as u64;
-    let suspects = suspects(settings, film.tally(), paths);
+    let suspects = suspects(settings, film.tally(), film.paths());
     let mut entries = Vec::new();
     if suspects.is_empty() {
         return Ok(entries);

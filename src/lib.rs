@@ -15,14 +15,15 @@
 //!    trace the same paths. [`backend`]: one of them, opened.
 //! 8. [`render`]: the loop that asks a renderer for windows of samples until a stop rule holds.
 //! 9. [`film`]: f64 sums and variances over all windows.
-//! 10. [`estimate`]: mean and error. [`forecast`]: what an error will cost, from a pilot.
-//!     [`ledger`]: how much light inexact settings took.
+//! 10. [`estimate`] and [`allocation`]: mean and error; where further samples go. [`forecast`]: what an
+//!     error will cost, from a pilot. [`ledger`]: how much light inexact settings took.
 //! 11. [`output`]: images, statistics, progress.
 //! 12. [`input`] and [`compare`](mod@compare): images of any origin, and how far two are apart.
 //!
 //! [`check`] measures the hard cases of all this on a device, with the tests of [`statistics`].
 //! [`error`] is what can go wrong anywhere.
 
+pub mod allocation;
 pub mod backend;
 pub mod check;
 pub mod cli;
@@ -35,6 +36,7 @@ pub mod film;
 pub mod forecast;
 pub mod gpu;
 pub mod input;
+pub mod intervals;
 pub mod ledger;
 pub mod lights;
 pub mod media;

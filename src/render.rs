@@ -3,9 +3,11 @@
 use std::ops::Range;
 use std::time::{Duration, Instant};
 
+use crate::allocation::{Allocation, Tiles};
 use crate::error::Result;
 use crate::estimate::Estimate;
-use crate::film::{Film, Window, window_end};
+use crate::film::{BLOCK, Film, LEAST_SAMPLES, Window, next_look, window_end};
+use crate::sampler::PILOT;
 use crate::settings::{Rect, Settings};
 
 /// Renders windows of samples: the GPU or the CPU reference. What comes after does not know which.
@@ -18,7 +20,20 @@ pub trait Renderer {
     ///
     /// # Errors
     /// If the device fails. The film keeps what it has.
-    fn render(&mut self, samples: Range<u64>, control: &mut dyn Control) -> Result<Window>;
+    fn render(&mut self, samples: Range<u64>, control: &mut dyn Control) -> Result<Window> {
+        self.render_tiles(samples, None, control)
+    }
+
+    /// The same for some tiles only; `None`: for all. Needs the effect `adaptive`.
+    ///
+    /// # Errors
+    /// If the device fails. The film keeps what it has.
+    fn render_tiles(
+        &mut self,
+        samples: Range<u64>,
+        tiles: Option<&Tiles>,
+        control: &mut dyn Control,
+    ) -> Result<Window>;
 
     /// From now on renders only `crop`, which lies in what the renderer was made for.
     fn show(&mut self, crop: Rect);
@@ -75,6 +90,8 @@ pub trait Watch {
 pub struct Outcome {
     /// The sums.
     pub film: Film,
+    /// Samples a pixel of the pilot, which are not in the film.
+    pub pilot: u64,
     /// Mean and error.
     pub estimate: Estimate,
     /// Why it ended.
@@ -101,63 +118,135 @@ impl Control for Loop<'_> {
     }
 }
 
+/// Samples a pixel of a pilot: as many as its error needs to be known.
+pub const PILOT_SAMPLES: u64 = LEAST_SAMPLES;
+
 /// Renders until all samples are done or a stop rule of `settings` holds.
 pub fn render(renderer: &mut dyn Renderer, settings: &Settings, watch: &mut dyn Watch) -> Outcome {
-    let mut film = Film::new(settings.crop);
-    let mut estimate = Estimate::of(&film);
     let pixels = settings.crop.pixels() as u64;
-    let total = (settings.samples.end - settings.samples.start).saturating_mul(pixels);
-    let begin = Instant::now();
+    let spp = settings.samples.end - settings.samples.start;
     let status = Status {
         paths: 0,
-        total,
+        total: spp.saturating_mul(pixels),
         elapsed: Duration::ZERO,
         error: None,
     };
-    let mut control = Loop {
-        watch,
-        begin,
-        deadline: settings.time,
-        status,
+    let mut run = Run {
+        renderer,
+        settings,
+        control: Loop {
+            watch,
+            begin: Instant::now(),
+            deadline: settings.time,
+            status,
+        },
+        failure: None,
     };
-    let mut start = settings.samples.start;
-    let mut failure = None;
-    let stopped_by = loop {
-        if start >= settings.samples.end {
-            break StoppedBy::Spp;
+    let mut film = Film::new(settings.crop);
+    let mut pilot = 0;
+    let stopped_by = if !settings.adaptive {
+        run.fill(&mut film, settings.samples.clone())
+    } else if let Err(stopped_by) = run.windows(&mut film, 0, 0..PILOT_SAMPLES.min(spp), PILOT) {
+        stopped_by
+    } else {
+        // The pilot is in no image. Else a tile that it finds dark by chance would get few samples, and
+        // stay too dark.
+        let left = spp.saturating_sub(PILOT_SAMPLES);
+        let allocation = Allocation::of(&film, left as f64 / LEAST_SAMPLES as f64);
+        let end = (left as f64 / allocation.mean_weight()) as u64 / BLOCK * BLOCK;
+        let mut image = Film::of(allocation);
+        let stopped_by = run.fill(&mut image, 0..end);
+        // Without a sample in every pixel it is the better image, and no smaller one: what stopped it
+        // was not what it shows.
+        if image.samples() > 0 {
+            pilot = film.samples();
+            image.count(film.tally(), film.paths());
+            film = image;
         }
-        if control.watch.interrupted() {
-            break StoppedBy::Interrupt;
-        }
-        if settings.time.is_some_and(|time| begin.elapsed() >= time) {
-            break StoppedBy::Time;
-        }
-        let window = start..window_end(start, settings.samples.end);
-        match renderer.render(window, &mut control) {
-            Ok(window) => {
-                start = window.samples.end;
-                film.add(&window);
-            }
-            Err(error) => {
-                failure = Some(error);
-                break StoppedBy::Failure;
-            }
-        }
-        estimate = Estimate::of(&film);
-        control.status.error = estimate.error;
-        if settings
-            .error
-            .is_some_and(|limit| estimate.error.is_some_and(|e| e <= limit))
-        {
-            break StoppedBy::Error;
-        }
+        stopped_by
     };
     Outcome {
+        estimate: Estimate::of(&film),
         film,
-        estimate,
+        pilot,
         stopped_by,
-        elapsed: begin.elapsed(),
-        failure,
+        elapsed: run.control.begin.elapsed(),
+        failure: run.failure,
+    }
+}
+
+/// A render under way.
+struct Run<'a> {
+    renderer: &'a mut dyn Renderer,
+    settings: &'a Settings,
+    control: Loop<'a>,
+    failure: Option<crate::error::Error>,
+}
+
+impl Run<'_> {
+    /// Fills the film until the pixels of step 0 have the samples of `range`, or a stop rule holds:
+    /// those of step s are always 2^s times as far.
+    fn fill(&mut self, film: &mut Film, range: Range<u64>) -> StoppedBy {
+        let mut start = range.start;
+        let mut look = next_look(0);
+        while start < range.end {
+            let end = window_end(start, range.end);
+            for step in 0..film.steps() {
+                let part = start << step..end << step;
+                if let Err(stopped_by) = self.windows(film, step, part, 0) {
+                    return stopped_by;
+                }
+            }
+            start = end;
+            let error = Estimate::of(film).error;
+            self.control.status.error = error;
+            // At sample counts that nothing seen so far decides.
+            if film.samples() >= look {
+                look = next_look(film.samples());
+                let reached = |limit| error.is_some_and(|e| e <= limit);
+                if self.settings.error.is_some_and(reached) {
+                    return StoppedBy::Error;
+                }
+            }
+        }
+        StoppedBy::Spp
+    }
+
+    /// Adds the windows of a range to the pixels of one step; `Err` if something stops that. `origin` is
+    /// the index of sample 0.
+    fn windows(
+        &mut self,
+        film: &mut Film,
+        step: u8,
+        range: Range<u64>,
+        origin: u64,
+    ) -> std::result::Result<(), StoppedBy> {
+        let tiles = film.allocation().tiles(step);
+        let mut start = range.start;
+        while start < range.end {
+            if self.control.watch.interrupted() {
+                return Err(StoppedBy::Interrupt);
+            }
+            let begin = self.control.begin;
+            if self.settings.time.is_some_and(|t| begin.elapsed() >= t) {
+                return Err(StoppedBy::Time);
+            }
+            let samples = origin + start..origin + window_end(start, range.end);
+            let window = self
+                .renderer
+                .render_tiles(samples, tiles.as_ref(), &mut self.control);
+            match window {
+                Ok(window) => {
+                    start = window.samples.end - origin;
+                    film.add_to(step, &window);
+                }
+                Err(error) => {
+                    self.failure = Some(error);
+                    return Err(StoppedBy::Failure);
+                }
+            }
+        }
+        Ok(())
     }
 }
 

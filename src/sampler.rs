@@ -1,5 +1,9 @@
 //! Where samples lie: which of them are placed together, and so cannot be told apart by chance.
 
+/// From this index on samples are a pilot's: they decide where others go (`--adaptive`), and are in no
+/// image. They are placed as those from index 0 on.
+pub const PILOT: u64 = 1 << 48;
+
 /// How the random numbers of a sample are made (`--sampler`).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Sampler {
@@ -29,7 +33,7 @@ impl Sampler {
     /// of a window (`film::window_end`) are of one length.
     #[must_use]
     pub fn batch(self, index: u64) -> u64 {
-        match (self, index) {
+        match (self, index.checked_sub(PILOT).unwrap_or(index)) {
             (Self::Independent, _) | (Self::Sobol, 0..64) => 4,
             (Self::Sobol, 64..256) => 16,
             (Self::Sobol, _) => 64,

@@ -39,6 +39,8 @@ pub struct Settings {
     pub geometry: GeometryChoice,
     /// How a path leaves a surface.
     pub offset: Offset,
+    /// Whether a pilot decides where samples go; `samples` are then those a pixel on average, with it.
+    pub adaptive: bool,
     /// Stop when the estimated error is at most this.
     pub error: Option<f64>,
     /// Stop when rendering has taken this long.
@@ -66,6 +68,7 @@ impl Settings {
             roulette: true,
             geometry: GeometryChoice::Auto,
             offset: Offset::Exact,
+            adaptive: false,
             error: None,
             time: None,
         }

@@ -397,7 +397,9 @@ fn an_infinite_variance_has_no_error() {
         assert_eq!(stats["variance"], json!("infinite"));
         assert_eq!(stats["stopped_by"], json!("spp"));
         let warnings = stats["warnings"].as_array().expect("a list");
-        assert_eq!(warnings.len(), 1, "{stats}");
+        // The other is that the error was not reached.
+        let asked = usize::from(options.contains("--error"));
+        assert_eq!(warnings.len(), 1 + asked, "{stats}");
     }
 }
 
@@ -494,7 +496,15 @@ fn whichever_rule_comes_first_ends_the_render() {
             "1024 spp",
         ),
     ] {
-        let summary = folder.ok(&format!("--size 16x16 {options} -o r.npy --stats r.json"));
+        let run = folder.run(&format!("--size 16x16 {options} -o r.npy --stats r.json"));
+        assert_eq!(run.code, Some(0), "{options}: {run:?}");
+        let missed = stopped_by == "spp";
+        assert_eq!(run.stderr.is_empty(), !missed, "{options}: {run:?}");
+        if missed {
+            let samples = format!("was not reached within {said} samples a pixel");
+            holds(&run.stderr, &[&samples.replace(" spp", "")]);
+        }
+        let summary = run.stdout;
         let stats = folder.json("r.json");
         assert_eq!(stats["stopped_by"], json!(stopped_by), "{options}: {stats}");
         holds(&summary, &[said]);
@@ -504,6 +514,54 @@ fn whichever_rule_comes_first_ends_the_render() {
         assert!(stopped_by != "error" || error <= 0.3, "{options}: {stats}");
         let seconds = stats["seconds"]["render"].as_f64().expect("a number");
         assert!(stopped_by != "time" || seconds >= 0.3, "{options}: {stats}");
+    }
+}
+
+#[test]
+fn adaptive_samples_are_shared_out() {
+    let folder = Folder::new();
+    let base = "glass --size 48x40 --adaptive";
+    let summary = folder.ok(&format!(
+        "{base} --spp 512 -o a.exr --aov samples --stats a.json"
+    ));
+    let stats = folder.json("a.json");
+    let number = |value: &Value| value.as_u64().expect("a count");
+    let (least, most) = (
+        number(&stats["spp_range"][0]),
+        number(&stats["spp_range"][1]),
+    );
+    assert!(64 <= least && 2 * least <= most, "{stats}");
+    holds(
+        &summary,
+        &[&format!("{} spp ({least} to {most}), error", stats["spp"])],
+    );
+    assert_eq!(stats["pilot_spp"], json!(64));
+    let samples = number(&stats["samples"]);
+    assert!(
+        samples <= 512 * 48 * 40 && samples > 480 * 48 * 40,
+        "{stats}"
+    );
+    // The layer holds all samples but the pilot's.
+    let image = exr::prelude::read_first_flat_layer_from_file(folder.path("a.exr"));
+    let channels = image.expect("an EXR file").layer_data.channel_data.list;
+    let counts = channels.into_iter().find(|c| c.name.eq("samples.N"));
+    let counts = counts.expect("the channel").sample_data;
+    let all: f64 = counts.values_as_f32().map(f64::from).sum();
+    assert_eq!(all as u64, samples - 64 * 48 * 40);
+    // Other rules end it too; whatever does, every pixel has samples.
+    folder.ok(&format!("{base} --error 30% -o a.npy --stats a.json"));
+    assert_eq!(folder.json("a.json")["stopped_by"], json!("error"));
+    folder.ok(&format!("{base} --time 1ms -o a.npy --stats a.json"));
+    let stats = folder.json("a.json");
+    assert_eq!(stats["stopped_by"], json!("time"));
+    assert!(number(&stats["spp_range"][0]) > 0, "{stats}");
+    for (wrong, said) in [
+        ("--spp 127", "at least 128 samples"),
+        ("--sample-range 0..512", "--sample-range"),
+    ] {
+        let arguments = format!("{base} {wrong}");
+        let words: Vec<&str> = arguments.split_whitespace().collect();
+        holds(&folder.refused(&words), &[said]);
     }
 }
 

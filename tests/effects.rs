@@ -18,7 +18,7 @@ use rayon::prelude::*;
 type Set = BTreeSet<&'static str>;
 
 /// All effects, in the table's order.
-const ALL: [&str; 22] = [
+const ALL: [&str; 23] = [
     "baked",
     "list",
     "pole",
@@ -29,6 +29,7 @@ const ALL: [&str; 22] = [
     "ulp",
     "lens",
     "sobol",
+    "adaptive",
     "diffuse",
     "mirror",
     "dielectric",
@@ -59,7 +60,7 @@ const MATERIALS: [&str; 4] = ["diffuse", "mirror", "dielectric", "reflective"];
 
 /// Effects that must leave no trace in the WGSL where they are not in use, in any case, not even as
 /// a part of a name.
-const WORDS: [&str; 17] = [
+const WORDS: [&str; 18] = [
     "diffuse",
     "mirror",
     "dielectric",
@@ -67,6 +68,7 @@ const WORDS: [&str; 17] = [
     "reflective",
     "lens",
     "sobol",
+    "adaptive",
     "environment",
     "emission",
     "roulette",
@@ -213,6 +215,7 @@ fn asking_for(set: &Set) -> (Scene, Settings) {
             Integrator::Bsdf
         },
         roulette: has("roulette"),
+        adaptive: has("adaptive"),
         sampler: if has("sobol") {
             Sampler::Sobol
         } else {
@@ -395,7 +398,7 @@ fn every_possible_set() {
     };
     // Of sets with the rare ones, there are too many to link them all in a minute.
     let rare = [
-        "straddle", "nested", "nudge", "ulp", "lights", "mis", "sobol",
+        "straddle", "nested", "nudge", "ulp", "lights", "mis", "sobol", "adaptive",
     ];
     let common: Vec<&'static str> = ALL.into_iter().filter(|n| !rare.contains(n)).collect();
     let every = (0..1 << common.len()).map(|bits| subset(&common, bits));

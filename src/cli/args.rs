@@ -12,6 +12,7 @@ use super::values;
 use crate::effects::BAKED_MOST;
 use crate::error::{Error, Result};
 use crate::output::{Aov, ProgressMode};
+use crate::render::PILOT_SAMPLES;
 use crate::sampler::Sampler;
 use crate::scene::{MAX_BOUNCES, Scene};
 use crate::settings::{
@@ -120,6 +121,13 @@ pub struct RenderArgs {
         help = "Stop after this time: 30s, 2m, 1h; whichever of --spp, --error and --time comes first"
     )]
     pub time: Option<Duration>,
+    #[arg(
+        long,
+        conflicts_with = "sample_range",
+        help_heading = "How long",
+        help = "Let 64 samples a pixel, which are then discarded, decide where the others go"
+    )]
+    pub adaptive: bool,
     #[arg(
         long, value_name = "A..B", value_parser = values::range, conflicts_with = "spp",
         help_heading = "How long",
@@ -373,6 +381,14 @@ impl RenderArgs {
             )));
         }
         settings.offset = self.offset;
+        settings.adaptive = self.adaptive;
+        let least = 2 * PILOT_SAMPLES;
+        if self.adaptive && settings.samples.end < least {
+            return Err(Error::Usage(format!(
+                "--adaptive needs at least {least} samples a pixel: {PILOT_SAMPLES} of them decide where \
+                 the others go, and are in no pixel"
+            )));
+        }
         settings.error = self.error;
         settings.time = self.time;
         if self.backend == BackendArg::Cpu && self.device.is_some() {

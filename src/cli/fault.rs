@@ -4,6 +4,7 @@
 use std::ops::Range;
 use std::str::FromStr;
 
+use crate::allocation::Tiles;
 use crate::error::{Error, Result};
 use crate::film::{NonFinite, Window};
 use crate::gpu::device::Gpu;
@@ -84,7 +85,12 @@ impl Renderer for Faulty {
         self.inner.device()
     }
 
-    fn render(&mut self, samples: Range<u64>, control: &mut dyn Control) -> Result<Window> {
+    fn render_tiles(
+        &mut self,
+        samples: Range<u64>,
+        tiles: Option<&Tiles>,
+        control: &mut dyn Control,
+    ) -> Result<Window> {
         let due = self.windows == self.fault.window;
         self.windows += 1;
         if let Some(gpu) = self.gpu.as_ref().filter(|_| due) {
@@ -96,7 +102,7 @@ impl Renderer for Faulty {
                 FaultKind::NonFinite => {}
             }
         }
-        let mut window = self.inner.render(samples, control)?;
+        let mut window = self.inner.render_tiles(samples, tiles, control)?;
         if due && self.fault.kind == FaultKind::NonFinite {
             let tally = &mut window.tally;
             tally.non_finite += 3;

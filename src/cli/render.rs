@@ -281,15 +281,16 @@ fn observations(outcome: &Outcome, settings: &Settings) -> Vec<String> {
             f32::MAX
         ));
     }
-    let asked = settings
-        .error
-        .filter(|_| outcome.stopped_by != StoppedBy::Error);
-    if let Some(limit) = asked
-        && settings.samples.end - settings.samples.start == MAXIMUM_SPP
+    if let Some(limit) = settings.error
         && outcome.stopped_by == StoppedBy::Spp
     {
+        let spp = settings.samples.end - settings.samples.start;
+        let unknown = match outcome.estimate.error {
+            Some(_) => "",
+            None => "; it is unknown",
+        };
         said.push(format!(
-            "the error of {} was not reached within {MAXIMUM_SPP} samples a pixel",
+            "the error of {} was not reached within {spp} samples a pixel{unknown}",
             percent(limit)
         ));
     }
@@ -311,7 +312,7 @@ fn statistics(job: &Job, outcome: &Outcome, backend: &str, device: Device) -> St
         ..
     } = job;
     let film = &outcome.film;
-    let samples = film.samples() * settings.crop.pixels() as u64;
+    let samples = film.paths();
     let tally = film.tally();
     let start = settings.samples.start;
     Stats {
@@ -319,8 +320,10 @@ fn statistics(job: &Job, outcome: &Outcome, backend: &str, device: Device) -> St
         scene: loaded.name.clone(),
         scene_hash: loaded.hash.clone(),
         seed: settings.seed,
-        sample_range: [start, start + film.samples()],
-        spp: film.samples(),
+        sample_range: [start, start + film.most_samples()],
+        spp: film.mean_samples().round() as u64,
+        spp_range: [film.samples(), film.most_samples()],
+        pilot_spp: outcome.pilot,
         width: settings.crop.width,
         height: settings.crop.height,
         backend: backend.into(),
@@ -406,6 +409,12 @@ fn summary(job: &Job, stats: &Stats) -> String {
         StoppedBy::Interrupt => ", interrupted",
         StoppedBy::Failure => ", failed",
     };
+    let [least, most] = stats.spp_range;
+    let range = if least < most {
+        format!(" ({least} to {most})")
+    } else {
+        String::new()
+    };
     let cut = match stats.bounce_limit.paths {
         0 => String::new(),
         _ if stats.ledger.iter().any(|e| e.setting == "max-bounces") => String::new(),
@@ -420,7 +429,7 @@ fn summary(job: &Job, stats: &Stats) -> String {
         )
     });
     format!(
-        "{}: {}x{}, {} spp{stopped}, {error}{cut}{taken}{lost}, {:.2} s, {} Mpaths/s on {}\n",
+        "{}: {}x{}, {} spp{range}{stopped}, {error}{cut}{taken}{lost}, {:.2} s, {} Mpaths/s on {}\n",
         job.files(),
         stats.width,
         stats.height,

@@ -3,7 +3,7 @@
 mod pilot;
 mod survey;
 
-use crate::film::{WINDOW, window_end};
+use crate::film::{LEAST_SAMPLES, WINDOW, next_look, window_end};
 use crate::sampler::Sampler;
 
 pub use pilot::run;
@@ -52,9 +52,6 @@ pub struct Forecast {
     /// The ends of a 95 % interval for these.
     pub interval: [f64; 2],
 }
-
-/// Samples a pixel below which a render does not know its error: 16 batches.
-const KNOWN_FROM: u64 = 64;
 
 impl Pilot {
     /// The render that stops at the estimated error `limit`; `None` if `most` samples do not reach it, or
@@ -141,7 +138,7 @@ impl Pilot {
             return None;
         }
         // The relative error falls with every sample: bisection.
-        let (mut low, mut high) = (KNOWN_FROM.min(most), most);
+        let (mut low, mut high) = (LEAST_SAMPLES.min(most), most);
         while low < high {
             let middle = low + (high - low) / 2;
             if reached(middle) {
@@ -155,14 +152,21 @@ impl Pilot {
 
     /// The first look at the error at or after `spp` samples.
     fn look(&self, spp: u64) -> u64 {
-        window_end(self.start + spp - 1, u64::MAX) - self.start
+        let at_window_end =
+            |spp: u64| window_end(self.start + spp - 1, u64::MAX).saturating_sub(self.start);
+        let mut look = at_window_end(next_look(0));
+        while look < spp {
+            look = at_window_end(next_look(look));
+        }
+        look
     }
 
     /// Seconds that `spp` samples take.
     fn seconds(&self, spp: u64) -> f64 {
         let end = self.start + spp;
         // Ends of windows (`film::window_end`) below x.
-        let before = |x: u64| u64::from(x > 16) + u64::from(x > 64) + x.saturating_sub(1) / WINDOW;
+        let small = |x: u64| [16, 64, 128].iter().filter(|end| **end < x).count() as u64;
+        let before = |x: u64| small(x) + x.saturating_sub(1) / WINDOW;
         let windows = 1 + before(end) - before(self.start + 1);
         let paths = spp as f64 * self.pixels as f64;
         paths * self.path_seconds.value + windows as f64 * self.window_seconds
@@ -219,15 +223,22 @@ mod tests {
     #[test]
     fn a_render_stops_at_the_first_look_that_suffices() {
         let pilot = pilot();
-        for limit in [0.3, 0.1, 0.05, 0.02, 0.01, 0.003] {
+        let looks: Vec<u64> = std::iter::successors(Some(64), |look| Some(pilot.look(look + 1)))
+            .take(12)
+            .collect();
+        assert_eq!(looks[..5], [64, 128, 256, 512, 768]);
+        for limit in [0.3, 0.1, 0.05, 0.02, 0.01] {
             let forecast = pilot.to_error(limit, u64::MAX >> 1).expect("it is reached");
             assert!(forecast.error <= limit);
             assert_eq!(pilot.look(forecast.spp), forecast.spp, "{limit}");
-            let looks = (1..forecast.spp).map(|spp| pilot.look(spp));
-            let before = looks.filter(|look| *look < forecast.spp).max();
+            let before = looks
+                .iter()
+                .copied()
+                .filter(|look| *look < forecast.spp)
+                .max();
             let earlier = before.map(|spp| (spp, pilot.error(spp)));
             assert!(
-                earlier.is_none_or(|(spp, e)| spp < KNOWN_FROM || e > limit),
+                earlier.is_none_or(|(spp, e)| spp < LEAST_SAMPLES || e > limit),
                 "{earlier:?}"
             );
             let [low, high] = forecast.interval;
@@ -239,15 +250,15 @@ mod tests {
     #[test]
     fn seconds_count_paths_and_windows() {
         let pilot = pilot();
-        // Windows end at 16, 64, 256, 512, 768.
+        // Windows end at 16, 64, 128, 256, 512, 768.
         for (spp, windows) in [
             (1, 1),
             (16, 1),
             (17, 2),
             (64, 2),
-            (256, 3),
-            (257, 4),
-            (769, 6),
+            (256, 4),
+            (257, 5),
+            (769, 7),
         ] {
             let seconds = spp as f64 * 1.0e-3 + f64::from(windows) * 0.25;
             assert!((pilot.seconds(spp) - seconds).abs() < 1.0e-9, "{spp}");

@@ -7,10 +7,12 @@
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 
+use crate::allocation::{TILE, Tiles};
 use crate::effects::Effects;
 use crate::lights::Light;
 use crate::placement::{PlacedCamera, PlacedSphere, Placement};
 use crate::scene::{Material, MaterialKind, Scene, luminance};
+use crate::settings::Rect;
 
 /// `Sphere` of `shaders/scene/list.wesl`: a sphere about its centre.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
@@ -163,6 +165,45 @@ pub struct DispatchRecord {
     pub zero: u32,
     /// Samples of a batch minus 1, see [`crate::sampler::Sampler::batch`].
     pub last_of_batch: u32,
+}
+
+/// `adaptive_tiles` of `shaders/path.wesl`: a bit for every tile of a region.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct ChosenTiles {
+    bits: [[u32; 4]; 128],
+}
+
+impl ChosenTiles {
+    /// Every tile.
+    #[must_use]
+    pub fn all() -> Self {
+        Self {
+            bits: [[u32::MAX; 4]; 128],
+        }
+    }
+
+    /// The chosen ones of `tiles` in `region`, whose top left pixel is at `corner` among those of `tiles`.
+    #[must_use]
+    pub fn of(tiles: &Tiles, corner: [u32; 2], region: Rect) -> Self {
+        let mut bits = Self::zeroed();
+        let across = region.width.div_ceil(TILE);
+        for row in 0..region.height.div_ceil(TILE) {
+            for column in 0..across {
+                if tiles.has(corner[0] / TILE + column, corner[1] / TILE + row) {
+                    let tile = row * across + column;
+                    bits.bits[tile as usize / 128][tile as usize / 32 % 4] |= 1 << (tile % 32);
+                }
+            }
+        }
+        bits
+    }
+
+    /// Whether a tile of the region is chosen.
+    #[must_use]
+    pub fn has(&self, tile: u32) -> bool {
+        self.bits[tile as usize / 128][tile as usize / 32 % 4] >> (tile % 32) & 1 == 1
+    }
 }
 
 /// `Counters` of `shaders/path.wesl`.

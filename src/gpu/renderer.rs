@@ -7,11 +7,12 @@ use std::time::{Duration, Instant};
 use bytemuck::Zeroable as _;
 use wgpu::util::DeviceExt as _;
 
+use crate::allocation::{TILE, Tiles};
 use crate::effects::Effects;
 use crate::error::{Error, Result};
 use crate::film::{BLOCK, NonFinite, PixelSums, Tally, Window};
 use crate::gpu::device::Gpu;
-use crate::gpu::layout::{CameraRecord, CountersRecord, DispatchRecord};
+use crate::gpu::layout::{CameraRecord, ChosenTiles, CountersRecord, DispatchRecord};
 use crate::gpu::upload::Uploads;
 use crate::placement::Placement;
 use crate::render::{Control, Renderer};
@@ -20,9 +21,8 @@ use crate::scene::Scene;
 use crate::settings::{Integrator, Rect, Settings, stream_words};
 use crate::shader::{Kernel, LOOP_ITERATIONS, Stage, link, ray_steps};
 
-/// Pixels along the side of the kernel's tile.
-const TILE: u32 = 8;
-/// Longest side of a region, the unit of memory: images beyond it are rendered in pieces.
+/// Longest side of a region, the unit of memory: images beyond it are rendered in pieces. A multiple of
+/// the tile's, and of no more tiles than `ChosenTiles` can hold.
 const REGION: u32 = 1024;
 /// What a dispatch should take: short enough for every watchdog and for a smooth progress bar.
 const DISPATCH: Duration = Duration::from_millis(75);
@@ -61,6 +61,7 @@ pub struct GpuRenderer {
     pipeline: wgpu::ComputePipeline,
     bind_group: wgpu::BindGroup,
     work: wgpu::Buffer,
+    chosen: wgpu::Buffer,
     counters: wgpu::Buffer,
     region: RegionTargets,
     /// Kernel radiance per radiance.
@@ -117,6 +118,7 @@ impl GpuRenderer {
             bytemuck::bytes_of(&CameraRecord::new(&placement.camera)),
         );
         let work = uniform("work", bytemuck::bytes_of(&DispatchRecord::zeroed()));
+        let chosen = uniform("chosen", bytemuck::bytes_of(&ChosenTiles::all()));
         let buffer = |label, size: u64, usage| {
             device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some(label),
@@ -169,6 +171,7 @@ impl GpuRenderer {
             (5, work.as_entire_binding()),
             (6, partials.as_entire_binding()),
             (7, counters.as_entire_binding()),
+            (15, chosen.as_entire_binding()),
         ];
         entries.extend(
             uploaded
@@ -205,6 +208,7 @@ impl GpuRenderer {
             pipeline,
             bind_group,
             work,
+            chosen,
             counters,
             region,
             light: placement.light,
@@ -223,6 +227,13 @@ impl GpuRenderer {
     #[must_use]
     pub fn with_limits(mut self, limits: DispatchLimits) -> Self {
         self.limits = limits;
+        self
+    }
+
+    /// The same renderer, compiled once, with another seed: for studies over many.
+    #[must_use]
+    pub fn with_seed(mut self, seed: u64) -> Self {
+        self.seed = seed;
         self
     }
 
@@ -302,10 +313,15 @@ impl GpuRenderer {
         &mut self,
         region: Rect,
         samples: Range<u64>,
+        chosen: Option<&ChosenTiles>,
         may_stop: bool,
         control: &mut dyn Control,
     ) -> Result<u64> {
         let tiles = region.width.div_ceil(TILE) * region.height.div_ceil(TILE);
+        let is_chosen = |tile: &u32| chosen.is_none_or(|c| c.has(*tile));
+        let all = (0..tiles).filter(is_chosen).count() as u32;
+        // Of the region's pixels, those in chosen tiles: tiles at its edge may be smaller.
+        let pixels = region.pixels() as f64 * f64::from(all) / f64::from(tiles);
         let mut record = DispatchRecord {
             region_origin: [region.x, region.y],
             region_size: [region.width, region.height],
@@ -317,22 +333,28 @@ impl GpuRenderer {
         };
         let mut start = samples.start;
         while start < samples.end {
-            let end = self.slab_end(start..samples.end, region.pixels() as f64);
+            let end = self.slab_end(start..samples.end, pixels.max(1.0));
             record.fresh = u32::from(start == samples.start);
             record.end_sample = end as u32;
             let mut proceed = true;
             let mut first = 0;
             while first < tiles {
-                let count = self.tile_count(end - start).min(tiles - first);
+                let most = self.tile_count(end - start);
+                let next = (first..tiles).filter(is_chosen).nth(most as usize);
+                let next = next.unwrap_or(tiles);
+                let count = (first..next).filter(is_chosen).count() as u32;
+                if count == 0 {
+                    break;
+                }
                 record.first_tile = first;
-                record.end_tile = first + count;
+                record.end_tile = next;
                 let before = Instant::now();
                 self.finish_tiles(record)?;
                 let paths = f64::from(count) * f64::from(TILE * TILE) * (end - start) as f64;
                 self.rate = paths / before.elapsed().as_secs_f64().max(1.0e-6);
-                first += count;
-                let share = f64::from(count) / f64::from(tiles);
-                let done = share * region.pixels() as f64 * (end - start) as f64;
+                first = next;
+                let share = f64::from(count) / f64::from(all);
+                let done = share * pixels * (end - start) as f64;
                 proceed &= control.proceed(done as u64);
             }
             start = end;
@@ -365,7 +387,12 @@ impl GpuRenderer {
     }
 
     /// Reads back what the kernel left for `region`.
-    fn read(&mut self, region: Rect, samples: &Range<u64>) -> Result<(Vec<PixelSums>, Tally)> {
+    fn read(
+        &mut self,
+        region: Rect,
+        samples: &Range<u64>,
+        chosen: Option<&ChosenTiles>,
+    ) -> Result<(Vec<PixelSums>, Tally)> {
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
         let stride = row_stride(region.width);
         for (texture, staging) in self.region.textures.iter().zip(&self.region.staging) {
@@ -411,7 +438,13 @@ impl GpuRenderer {
                     bytemuck::cast_slice(&bytes[row.clone()][..region.width as usize * 16]).to_vec()
                 };
                 let (high, low, deviation) = (row(&high), row(&low), row(&deviation));
+                let across = region.width.div_ceil(TILE);
                 for x in 0..region.width as usize {
+                    // Elsewhere the textures hold what was before.
+                    let tile = y / TILE * across + x as u32 / TILE;
+                    if !chosen.is_none_or(|c| c.has(tile)) {
+                        continue;
+                    }
                     let pixel = &mut pixels[(y * region.width) as usize + x];
                     for c in 0..3 {
                         let sum = f64::from(high[x][c]) + f64::from(low[x][c]);
@@ -456,7 +489,12 @@ impl Renderer for GpuRenderer {
         (s.name.clone(), s.backend.clone(), s.driver.clone())
     }
 
-    fn render(&mut self, samples: Range<u64>, control: &mut dyn Control) -> Result<Window> {
+    fn render_tiles(
+        &mut self,
+        samples: Range<u64>,
+        tiles: Option<&Tiles>,
+        control: &mut dyn Control,
+    ) -> Result<Window> {
         let mut window = Window {
             rect: self.crop,
             batch: self.sampler.batch(samples.start),
@@ -464,12 +502,23 @@ impl Renderer for GpuRenderer {
             pixels: vec![PixelSums::default(); self.crop.pixels()],
             tally: Tally::default(),
         };
+        if tiles.is_some() && !self.kernel.has_binding(15) {
+            return Err(Error::Shader("the kernel renders all tiles or none".into()));
+        }
         let side = REGION.min(self.gpu.limits.max_texture_dimension_2d);
         for (i, region) in self.crop.pieces(side).enumerate() {
             // All pieces get the samples that the first one got.
             let wanted = window.samples.clone();
-            window.samples.end = self.render_region(region, wanted, i == 0, control)?;
-            let (pixels, tally) = self.read(region, &window.samples)?;
+            let corner = [region.x - self.crop.x, region.y - self.crop.y];
+            let chosen = tiles.map(|tiles| ChosenTiles::of(tiles, corner, region));
+            if self.kernel.has_binding(15) {
+                let bits = chosen.unwrap_or(ChosenTiles::all());
+                let bytes = bytemuck::bytes_of(&bits);
+                self.gpu.queue.write_buffer(&self.chosen, 0, bytes);
+            }
+            let chosen = chosen.as_ref();
+            window.samples.end = self.render_region(region, wanted, chosen, i == 0, control)?;
+            let (pixels, tally) = self.read(region, &window.samples, chosen)?;
             window.tally.add(&tally);
             for (y, row) in pixels.chunks(region.width as usize).enumerate() {
                 let line = (region.y - self.crop.y) as usize + y;

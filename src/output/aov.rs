@@ -53,7 +53,7 @@ impl Plane {
                 .flat_map(|i| film.variance_of_mean(i).unwrap_or([f64::NAN; 3]))
                 .map(|v| v.sqrt() as f32)
                 .collect(),
-            Aov::Samples => pixels.map(|_| film.samples() as f32).collect(),
+            Aov::Samples => pixels.map(|i| film.samples_of(i) as f32).collect(),
         };
         Self { aov, values }
     }

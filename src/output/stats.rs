@@ -26,8 +26,12 @@ pub struct Stats {
     pub seed: u64,
     /// The samples of each pixel that were taken: first, and one past the last.
     pub sample_range: [u64; 2],
-    /// Samples per pixel that were taken.
+    /// Samples per pixel that the image has: their mean, rounded, with adaptive sampling.
     pub spp: u64,
+    /// The samples of the pixels that have fewest and most.
+    pub spp_range: [u64; 2],
+    /// Samples per pixel that decided where the others went, and are in no pixel.
+    pub pilot_spp: u64,
     /// Columns of the image.
     pub width: u32,
     /// Rows of the image.
@@ -50,7 +54,7 @@ pub struct Stats {
     pub roulette: bool,
     /// Where the time went.
     pub seconds: Seconds,
-    /// Paths that were started, over all pixels.
+    /// Paths that were started, over all pixels, the pilot's too.
     pub samples: u64,
     /// `samples` over the time of rendering.
     pub paths_per_second: f64,

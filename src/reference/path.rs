@@ -16,6 +16,7 @@ use super::scene::camera::camera_ray;
 use super::scene::priority::{cross_surface, relative_index};
 use super::scene::ray::{Hit, Ray, Vertex, leave, vertex_at};
 use super::scene::sphere::closest_hit;
+use crate::allocation::Tiles;
 use crate::error::{Error, Result};
 use crate::film::{BLOCK, NonFinite, PixelSums, Tally, Window};
 use crate::media::Medium;
@@ -321,10 +322,18 @@ impl Renderer for ReferenceRenderer {
         )
     }
 
-    fn render(&mut self, samples: Range<u64>, control: &mut dyn Control) -> Result<Window> {
+    fn render_tiles(
+        &mut self,
+        samples: Range<u64>,
+        tiles: Option<&Tiles>,
+        control: &mut dyn Control,
+    ) -> Result<Window> {
         let crop: Rect = self.settings.crop;
         let width = crop.width as usize;
         let mut state = vec![PixelState::default(); crop.pixels()];
+        let chosen = |x: usize, y: usize| tiles.is_none_or(|t| t.has_pixel(x as u32, y as u32));
+        let all = (0..crop.pixels()).filter(|i| chosen(i % width, i / width));
+        let all = all.count() as u64;
         let mut start = samples.start;
         while start < samples.end {
             // A block at a time over the whole image: then it can stop.
@@ -337,12 +346,15 @@ impl Renderer for ReferenceRenderer {
                     .enumerate()
                     .for_each(|(y, row)| {
                         for (x, state) in row.iter_mut().enumerate() {
+                            if !chosen(x, y) {
+                                continue;
+                            }
                             let pixel = [crop.x + x as u32, crop.y + y as u32];
                             self.pixel(pixel, &(start..end), state);
                         }
                     });
             });
-            let paths = crop.pixels() as u64 * (end - start);
+            let paths = all * (end - start);
             start = end;
             if !control.proceed(paths) {
                 break;

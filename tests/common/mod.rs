@@ -104,11 +104,15 @@ pub(crate) fn render_gpu(scene: &Scene, settings: &Settings) -> Film {
         .film
 }
 
+/// A renderer on the CPU.
+pub(crate) fn cpu_renderer(scene: &Scene, settings: &Settings) -> ReferenceRenderer {
+    let placement = Placement::with_offset(scene, settings.width, settings.height, settings.offset);
+    ReferenceRenderer::new(scene, &placement, settings, 0).unwrap_or_else(|e| panic!("{e}"))
+}
+
 /// Renders with the CPU reference.
 pub(crate) fn render_cpu(scene: &Scene, settings: &Settings) -> Film {
-    let placement = Placement::with_offset(scene, settings.width, settings.height, settings.offset);
-    let mut renderer =
-        ReferenceRenderer::new(scene, &placement, settings, 0).unwrap_or_else(|e| panic!("{e}"));
+    let mut renderer = cpu_renderer(scene, settings);
     render_quietly(&mut renderer, settings)
         .unwrap_or_else(|e| panic!("{e}"))
         .film

@@ -1,0 +1,69 @@
+//! Error bars are true: 95 % intervals hold the truth in about 95 % of all pixels, also of renders that
+//! stopped by their error. The long form is `cargo xtask bench coverage`.
+
+mod common;
+#[path = "../benches/coverage/study.rs"]
+#[expect(dead_code, reason = "the long form shows more")]
+mod study;
+
+use common::{gpu, scene_file, settings};
+use gpu_trace::sampler::Sampler;
+use gpu_trace::settings::{Integrator, Settings};
+use study::{Truth, coverage, runs};
+
+const SEEDS: u64 = 60;
+const SAMPLES: [u64; 2] = [128, 512];
+
+#[test]
+fn intervals_hold_the_truth() {
+    for (name, integrator, sampler) in [
+        ("lecture", Integrator::Bsdf, Sampler::Sobol),
+        ("lecture", Integrator::Bsdf, Sampler::Independent),
+        ("glass", Integrator::Bsdf, Sampler::Sobol),
+        ("tests/lamps", Integrator::Path, Sampler::Sobol),
+    ] {
+        let scene = scene_file(format!("scenes/{name}.toml"));
+        let settings = Settings {
+            integrator,
+            sampler,
+            ..settings(&scene, 20, 16, 512)
+        };
+        let runs = runs(&gpu(), &scene, &settings, SEEDS, &SAMPLES, 256);
+        let own = &runs.said[SAMPLES.len() - 1];
+        let truth = Truth::of(own.iter());
+        for said in &runs.said {
+            let c = coverage(said, own, &truth, 1.0);
+            let spp = said.iter().map(|s| s.samples).sum::<u64>() / SEEDS;
+            // Pixels are nearly independent of each other.
+            let error = (0.05 * 0.95 / c.count).sqrt();
+            eprintln!(
+                "{name}, {}, {spp} spp: {:.2} +- {:.2} %, error {:.4}, estimated/actual {:.3}",
+                sampler.name(),
+                100.0 * c.ours,
+                100.0 * error,
+                c.error,
+                c.honesty
+            );
+            let slack = 3.9 * error;
+            assert!(
+                (0.93 - slack..0.97 + slack).contains(&c.ours),
+                "{name}: {}",
+                c.ours
+            );
+            assert!((c.honesty - 1.0).abs() < 0.1, "{name}: {}", c.honesty);
+            // Companions: normal intervals where batches are few, and ours of three quarters of the width.
+            let few = sampler == Sampler::Sobol;
+            assert!(!few || c.normal < 0.935, "{name}: normal {}", c.normal);
+            let narrow = coverage(said, own, &truth, 0.75).ours;
+            assert!(narrow < 0.93 - slack, "{name}: narrow {narrow}");
+        }
+        // What the stopped ones promised: looks come late, never early.
+        let stopped = coverage(&runs.said[SAMPLES.len()], own, &truth, 1.0);
+        assert!(
+            stopped.error < 1.05 * runs.limit,
+            "{name}: {} of {}",
+            stopped.error,
+            runs.limit
+        );
+    }
+}
