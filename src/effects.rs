@@ -4,10 +4,11 @@
 //! are dropped from the shared structs, its branches and bindings are gone. The kernel's sources
 //! (`shaders/`) name effects in `@if(...)`; [`Effects::flags`] says which are on.
 
+use crate::lights::MOST_WEIGHED;
 use crate::placement::{PlacedSphere, Placement, Side};
 use crate::sampler::Sampler;
 use crate::scene::{MaterialKind, Scene};
-use crate::settings::{GeometryChoice, Integrator, Offset, Settings};
+use crate::settings::{GeometryChoice, Integrator, LightSampling, Offset, Settings};
 
 /// Spheres up to which they are baked into the kernel as constants: measured, see
 /// `benches/RESULTS.md`.
@@ -86,7 +87,11 @@ impl Effects {
                 format!("sphere {} ({name})", sphere.source + 1)
             }))
         };
-        let to_lights = matches!(settings.integrator, Integrator::Path | Integrator::Nee);
+        let to_lights = matches!(settings.integrator, Integrator::Path | Integrator::Nee)
+            && !placement.lights.table.is_empty();
+        let lights = placement.lights.table.len();
+        let from_table = placement.lights.from_table(settings.light_sampling);
+        let projected = settings.light_sampling == LightSampling::Projected;
         let table = vec![
             Effect {
                 name: "baked",
@@ -218,10 +223,27 @@ impl Effects {
                 reasons: if to_lights { sampled() } else { vec![] },
             },
             Effect {
+                name: "projected",
+                what: "light sampling by projected solid angle",
+                reasons: when(to_lights && projected, "light sampling projected".into()),
+            },
+            Effect {
+                name: "table",
+                what: "lights drawn from a table by power, whatever the vertex",
+                reasons: when(
+                    to_lights && from_table,
+                    if projected {
+                        format!("{lights} lights; weighed at each vertex up to {MOST_WEIGHED}")
+                    } else {
+                        "--light-sampling cone".into()
+                    },
+                ),
+            },
+            Effect {
                 name: "mis",
                 what: "weights between light sampling and BSDF sampling",
                 reasons: when(
-                    settings.integrator == Integrator::Path && !placement.lights.table.is_empty(),
+                    settings.integrator == Integrator::Path && to_lights,
                     integrator.clone(),
                 ),
             },

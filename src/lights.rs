@@ -3,15 +3,17 @@
 //! Part of the placement: decided once, for both renderers.
 
 use crate::placement::{PlacedSphere, Placement, Side};
-use crate::scene::{Scene, luminance};
-use crate::settings::Offset;
+use crate::scene::{MaterialKind, Scene, Sphere, luminance};
+use crate::settings::{LightSampling, Offset};
 
 /// A sphere that light sampling can choose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Light {
     /// Index into the placement's spheres.
     pub sphere: usize,
-    /// Of being chosen: its share of the power of all.
+    /// Luminance of its radiance.
+    pub luminance: f64,
+    /// Of being drawn from the table: its share of the power of all.
     pub probability: f64,
     /// In the alias table: the entry is this light below the threshold, else `alias`.
     pub threshold: f64,
@@ -22,18 +24,53 @@ pub struct Light {
 /// All lights that are sampled.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Lights {
-    /// The alias table.
+    /// All of them, as an alias table.
     pub table: Vec<Light>,
-    /// One over the sum of r² luminance(radiance), in scene radiance and kernel lengths.
-    pub share: f64,
+    /// By sphere of the placement: its place in the table.
+    places: Vec<Option<usize>>,
 }
+
+/// Lights up to which each is weighed at each vertex: measured, see `benches/RESULTS.md`.
+pub const MOST_WEIGHED: usize = 8;
 
 /// Whether light sampling finds this sphere from outside. Walls (with a pole frame) are left to BSDF
 /// sampling: they fill so much of the view that it finds them as well, and nothing is gained by
-/// directions that the rest of the scene mostly hides.
+/// directions that the rest of the scene mostly hides. So are lamps that only glass can see.
 fn is_sampled(scene: &Scene, sphere: &PlacedSphere) -> bool {
     let emission = scene.materials[sphere.material].emission;
-    sphere.pole.is_none() && sphere.side != Side::Inside && luminance(emission) > 0.0
+    sphere.pole.is_none()
+        && sphere.side != Side::Inside
+        && luminance(emission) > 0.0
+        && !is_sealed(scene, sphere.source)
+}
+
+/// Whether a dielectric is all around `scene.spheres[lamp]`, and nothing in it scatters light but in
+/// delta lobes: to every vertex that looks for lights, its surface hides the lamp.
+fn is_sealed(scene: &Scene, lamp: usize) -> bool {
+    let kind = |sphere: &Sphere| scene.materials[sphere.material].kind;
+    let smooth = |sphere: &Sphere| {
+        matches!(
+            kind(sphere),
+            MaterialKind::Mirror { .. } | MaterialKind::Dielectric { .. }
+        )
+    };
+    let inner = &scene.spheres[lamp];
+    scene.spheres.iter().enumerate().any(|(glass, outer)| {
+        let distance = |other: &Sphere| other.center.distance(outer.center);
+        let reaches = |other: &Sphere| {
+            let apart = distance(other) >= outer.radius + other.radius;
+            let around = distance(other) + outer.radius <= other.radius;
+            !apart && !around
+        };
+        glass != lamp
+            && matches!(kind(outer), MaterialKind::Dielectric { .. })
+            && distance(inner) + inner.radius <= outer.radius
+            && !scene
+                .spheres
+                .iter()
+                .enumerate()
+                .any(|(i, other)| i != lamp && i != glass && !smooth(other) && reaches(other))
+    })
 }
 
 impl Lights {
@@ -47,35 +84,44 @@ impl Lights {
         if placement.offset == Offset::Exact && placement.spheres.iter().any(unknown) {
             return Self::default();
         }
-        let chosen: Vec<(usize, f64)> = placement
-            .spheres
-            .iter()
-            .enumerate()
+        let emitted = |i: usize| luminance(scene.materials[placement.spheres[i].material].emission);
+        let spheres = placement.spheres.iter().enumerate();
+        let chosen: Vec<(usize, f64)> = spheres
             .filter(|(_, s)| is_sampled(scene, s))
-            .map(|(i, s)| {
-                let emission = scene.materials[s.material].emission;
-                (i, s.radius * s.radius * luminance(emission))
-            })
+            .map(|(i, s)| (i, s.radius * s.radius * emitted(i)))
             .collect();
         let total: f64 = chosen.iter().map(|(_, power)| power).sum();
         if chosen.is_empty() || !(total > 0.0 && total.is_finite()) {
             return Self::default();
         }
         let probabilities: Vec<f64> = chosen.iter().map(|(_, power)| power / total).collect();
-        let table = alias_table(&probabilities)
-            .into_iter()
-            .zip(&chosen)
-            .zip(&probabilities)
-            .map(|(((threshold, alias), (sphere, _)), probability)| Light {
-                sphere: *sphere,
-                probability: *probability,
+        let entries = alias_table(&probabilities).into_iter().enumerate();
+        let table: Vec<Light> = entries
+            .map(|(i, (threshold, alias))| Light {
+                sphere: chosen[i].0,
+                luminance: emitted(chosen[i].0),
+                probability: probabilities[i],
                 threshold,
                 alias,
-            });
-        Self {
-            table: table.collect(),
-            share: 1.0 / total,
+            })
+            .collect();
+        let mut places = vec![None; placement.spheres.len()];
+        for (place, light) in table.iter().enumerate() {
+            places[light.sphere] = Some(place);
         }
+        Self { table, places }
+    }
+
+    /// The light that the placement's sphere `index` is, if it is sampled.
+    #[must_use]
+    pub fn of_sphere(&self, index: usize) -> Option<&Light> {
+        self.places.get(index)?.map(|place| &self.table[place])
+    }
+
+    /// Whether lights are drawn from the table, rather than weighed at each vertex.
+    #[must_use]
+    pub fn from_table(&self, sampling: LightSampling) -> bool {
+        sampling == LightSampling::Cone || self.table.len() > MOST_WEIGHED
     }
 }
 

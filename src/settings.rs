@@ -31,6 +31,8 @@ pub struct Settings {
     pub max_bounces: u32,
     /// The estimator.
     pub integrator: Integrator,
+    /// How a direction to a light is drawn (`path` and `nee`).
+    pub light_sampling: LightSampling,
     /// How the random numbers of samples are placed.
     pub sampler: Sampler,
     /// Whether paths end by Russian roulette on their throughput (`bsdf` only).
@@ -63,7 +65,8 @@ impl Settings {
             samples: 0..scene.render.spp.unwrap_or(DEFAULT_SPP),
             seed: 0,
             max_bounces: scene.render.max_bounces.unwrap_or(DEFAULT_MAX_BOUNCES),
-            integrator: Integrator::Bsdf,
+            integrator: Integrator::Path,
+            light_sampling: LightSampling::default(),
             sampler: Sampler::default(),
             roulette: true,
             geometry: GeometryChoice::Auto,
@@ -135,6 +138,28 @@ impl Integrator {
             Self::Bsdf => "bsdf",
             Self::Path => "path",
             Self::Nee => "nee",
+        }
+    }
+}
+
+/// How a light and a direction to it are drawn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum LightSampling {
+    /// A few lights by what they send to the vertex, many by power; a direction by projected solid
+    /// angle.
+    #[default]
+    Projected,
+    /// For comparison: lights by power, a direction by solid angle.
+    Cone,
+}
+
+impl LightSampling {
+    /// The name on the command line.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Projected => "projected",
+            Self::Cone => "cone",
         }
     }
 }

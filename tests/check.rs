@@ -41,7 +41,7 @@ fn the_catalogue_is_complete() {
     let not = cases()
         .into_iter()
         .filter(|case| matches!(case.run, Run::NotApplicable(_)));
-    assert!(not.count() <= 5, "too little of the catalogue is run");
+    assert!(not.count() <= 1, "too little of the catalogue is run");
 }
 
 #[test]
@@ -152,7 +152,7 @@ fn the_command_reports_and_exits() {
 #[test]
 fn the_json_says_the_same() {
     let folder = Folder::new();
-    let run = folder.run("check --quick --json --case 4 --case 16 --case 8 --offset back:1e-4");
+    let run = folder.run("check --quick --json --case 4 --case 25 --case 8 --offset back:1e-4");
     assert_eq!(run.code, Some(3), "{run:?}");
     let all: Value = serde_json::from_str(&run.stdout).expect("JSON");
     assert_eq!(all["device"]["name"], gpu().summary.name);

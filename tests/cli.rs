@@ -80,7 +80,7 @@ fn one_render_writes_every_format_over_what_was_there() {
     for (name, value) in [
         ("scene", text("lecture")),
         ("sample_range", text("0..8")),
-        ("integrator", text("bsdf")),
+        ("integrator", text("path")),
         ("seed", AttributeValue::I32(7)),
         ("spp", AttributeValue::I32(8)),
     ] {
@@ -195,7 +195,7 @@ fn the_statistics_say_what_was_done() {
         ("height", json!(4)),
         ("backend", json!("gpu")),
         ("geometry", json!("baked")),
-        ("integrator", json!("bsdf")),
+        ("integrator", json!("path")),
         ("sampler", json!("sobol")),
         ("max_bounces", json!(5)),
         ("roulette", json!(true)),
@@ -314,9 +314,9 @@ fn no_bounces_show_the_lamp_alone() {
 fn the_estimators_agree() {
     let folder = Folder::new();
     for (options, integrator, roulette, tolerance) in [
-        ("", "bsdf", true, 0.02),
-        ("--roulette on", "bsdf", true, 0.02),
-        ("--roulette off", "bsdf", false, 0.02),
+        ("", "path", true, 0.02),
+        ("--roulette on", "path", true, 0.02),
+        ("--roulette off", "path", false, 0.02),
         ("--integrator lecture", "lecture", false, 0.1),
         (
             "--integrator lecture --termination 0.4",
@@ -342,7 +342,7 @@ fn the_estimators_agree() {
         assert_eq!(stats["integrator"], json!(integrator), "{options}");
         assert_eq!(stats["roulette"], json!(roulette), "{options}");
         let effects = stats["effects"].as_array().expect("a list");
-        for (name, used) in [("roulette", roulette), ("bsdf", integrator == "bsdf")] {
+        for (name, used) in [("roulette", roulette), ("bsdf", integrator != "lecture")] {
             assert_eq!(effects.contains(&json!(name)), used, "{options}: {name}");
         }
         // The converged mean of the three channels over the whole image.

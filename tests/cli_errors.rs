@@ -73,7 +73,7 @@ fn options_are_refused_with_their_name_and_the_way_out() {
         --exposure 101 | --exposure | from -100 to 100
         --integrator lecture --termination 1 | --termination | as in 0.2
         --integrator lecture --termination -0.1 | --termination | as in 0.2
-        --integrator whitted | --integrator | bsdf, lecture
+        --integrator whitted | --integrator | path, bsdf, nee, lecture
         --sampler random | --sampler | sobol, independent
         --roulette maybe | --roulette | on, off
         --backend tpu | --backend | auto, gpu, cpu

@@ -8,17 +8,18 @@ use std::fmt::Write as _;
 
 use common::{scene, scene_file, scene_files};
 use gpu_trace::effects::Effects;
+use gpu_trace::lights::MOST_WEIGHED;
 use gpu_trace::placement::Placement;
 use gpu_trace::sampler::Sampler;
 use gpu_trace::scene::Scene;
-use gpu_trace::settings::{GeometryChoice, Integrator, Offset, Settings};
+use gpu_trace::settings::{GeometryChoice, Integrator, LightSampling, Offset, Settings};
 use gpu_trace::shader::{Stage, link};
 use rayon::prelude::*;
 
 type Set = BTreeSet<&'static str>;
 
 /// All effects, in the table's order.
-const ALL: [&str; 23] = [
+const ALL: [&str; 25] = [
     "baked",
     "list",
     "pole",
@@ -40,16 +41,20 @@ const ALL: [&str; 23] = [
     "lecture",
     "bsdf",
     "lights",
+    "projected",
+    "table",
     "mis",
     "roulette",
 ];
 
 /// Of these, only one can be in use.
-const EXCLUSIVE: [[&str; 2]; 8] = [
+const EXCLUSIVE: [[&str; 2]; 10] = [
     ["baked", "list"],
     ["lecture", "bsdf"],
     ["lecture", "roulette"],
     ["lecture", "lights"],
+    ["lecture", "projected"],
+    ["lecture", "table"],
     ["lecture", "mis"],
     ["nudge", "ulp"],
     ["nested", "nudge"],
@@ -60,7 +65,7 @@ const MATERIALS: [&str; 4] = ["diffuse", "mirror", "dielectric", "reflective"];
 
 /// Effects that must leave no trace in the WGSL where they are not in use, in any case, not even as
 /// a part of a name.
-const WORDS: [&str; 18] = [
+const WORDS: [&str; 20] = [
     "diffuse",
     "mirror",
     "dielectric",
@@ -76,6 +81,8 @@ const WORDS: [&str; 18] = [
     "interior",
     "lecture",
     "lights",
+    "projected",
+    "table",
     "nested",
     "nudge",
     "ulp",
@@ -106,11 +113,17 @@ fn completed(names: impl IntoIterator<Item = &'static str>) -> Set {
     if !set.contains("lecture") {
         set.insert("bsdf");
     }
-    if set.contains("mis") {
+    if ["mis", "projected", "table"]
+        .iter()
+        .any(|n| set.contains(n))
+    {
         set.insert("lights");
     }
     if set.contains("lights") {
         set.insert("emission");
+        if !set.contains("projected") {
+            set.insert("table");
+        }
     }
     let nudged = set.contains("nudge") || set.contains("ulp");
     if nudged {
@@ -185,6 +198,11 @@ fn asking_for(set: &Set) -> (Scene, Settings) {
     {
         sphere(0, 2.0 * i as f64, 1.5, 0.49999);
     }
+    if has("projected") && has("table") {
+        for i in 0..=MOST_WEIGHED {
+            sphere(0, 0.4 * i as f64 - 1.6, 4.0, 0.1);
+        }
+    }
     let nudged = has("nudge") || has("ulp");
     if has("straddle") && !nudged {
         // Through the lens, with something so small and far that this one gets no pole frame.
@@ -213,6 +231,11 @@ fn asking_for(set: &Set) -> (Scene, Settings) {
             Integrator::Nee
         } else {
             Integrator::Bsdf
+        },
+        light_sampling: if has("lights") && !has("projected") {
+            LightSampling::Cone
+        } else {
+            LightSampling::Projected
         },
         roulette: has("roulette"),
         adaptive: has("adaptive"),
@@ -330,8 +353,8 @@ fn all_pairs() {
             }
         }
     }
-    // And a straddled lamp with either of the two effects of light sampling, and a room with a sky.
-    assert_eq!(impossible, EXCLUSIVE.len() + 3);
+    // And a straddled lamp with any of the four effects of light sampling, and a room with a sky.
+    assert_eq!(impossible, EXCLUSIVE.len() + 5);
     check(&sets);
 }
 
@@ -347,7 +370,7 @@ fn largest() -> Vec<Set> {
                     "lecture" => lecture,
                     "bsdf" | "roulette" | "mis" => !lecture,
                     // See `possible`.
-                    "lights" => !lecture,
+                    "lights" | "projected" | "table" => !lecture,
                     "straddle" => lecture || exit != "nested",
                     "nested" | "nudge" | "ulp" => *name == exit,
                     _ => true,
@@ -398,11 +421,20 @@ fn every_possible_set() {
     };
     // Of sets with the rare ones, there are too many to link them all in a minute.
     let rare = [
-        "straddle", "nested", "nudge", "ulp", "lights", "mis", "sobol", "adaptive",
+        "straddle",
+        "nested",
+        "nudge",
+        "ulp",
+        "lights",
+        "projected",
+        "table",
+        "mis",
+        "sobol",
+        "adaptive",
     ];
     let common: Vec<&'static str> = ALL.into_iter().filter(|n| !rare.contains(n)).collect();
     let every = (0..1 << common.len()).map(|bits| subset(&common, bits));
-    let some = (0..4000u32).map(|i| subset(&ALL, i.wrapping_mul(0x9e37_79b9) >> 10));
+    let some = (0..4000u32).map(|i| subset(&ALL, i.wrapping_mul(0x9e37_79b9) >> 8));
     let sets: BTreeSet<Set> = every.chain(some).filter(possible).collect();
     eprintln!("{} sets", sets.len());
     check(&sets);

@@ -13,7 +13,7 @@ use gpu_trace::scene::Scene;
 use gpu_trace::settings::{Integrator, Settings};
 use gpu_trace::statistics::{chi_square, mean_and_error, sidak};
 
-const LIGHTS: [&str; 4] = ["baked", "emission", "lights", "mis"];
+const LIGHTS: [&str; 5] = ["baked", "emission", "lights", "table", "mis"];
 
 #[test]
 fn cones_keep_their_digits() {

@@ -161,7 +161,12 @@ fn weights(context: &Context, albedo: f64, measure: &mut Measure) -> Result<()> 
         .sphere([0.0; 3], 1.0, "wall")
         .sphere([0.0; 3], 0.4, "lamp")
         .load(context)?;
-    let film = context.render(&scene, &context.settings(&scene, 64, 1))?;
+    // With light sampling, a sample would be a sum over the vertices of its path.
+    let settings = Settings {
+        integrator: Integrator::Bsdf,
+        ..context.settings(&scene, 64, 1)
+    };
+    let film = context.render(&scene, &settings)?;
     let least = 0.5 * context.disturbed(0.5);
     // The product of the albedos and one division: less than a hundred roundings.
     let slack = 100.0 * U;

@@ -1,32 +1,31 @@
 //! Cases 16 to 21: lights.
 //!
-//! Lights are spheres that paths happen to hit, so what is measured are whole images. Their truth
-//! is known exactly, or comes from the same paths in f64.
+//! What light sampling knows of a light is measured function by function, the rest in whole images.
+//! Their truth is known exactly, or comes from the same paths in f64.
 
 use super::context::{Context, SceneText, means};
 use super::intersection::ULP;
-use super::{Case, Measure, Run};
+use super::{Case, Measure, Run, sampled};
 use crate::error::Result;
 use crate::film::Film;
 use crate::scene::Scene;
-use crate::settings::Settings;
+use crate::settings::{Integrator, Settings};
 use crate::statistics::normal_limit;
-
-const NO_LIGHT_SAMPLING: &str =
-    "light sampling is not the default; measured by tests/lights.rs so far";
 
 pub(super) const CASES: &[Case] = &[
     Case {
         id: 16,
         name: "a far light, sampled",
-        setup: "directions to a light of small solid angle",
-        run: Run::NotApplicable(NO_LIGHT_SAMPLING),
+        setup: "a light of 1e-8 to 1e-1 of its distance, above, across and on the horizon: solid \
+                angle and projected solid angle against f64, directions within the light",
+        run: Run::On(sampled::far),
     },
     Case {
         id: 17,
         name: "a near light, sampled",
-        setup: "directions to a light that almost touches",
-        run: Run::NotApplicable(NO_LIGHT_SAMPLING),
+        setup: "a light at 1 + e radii, e = 1e-7 to 1e-1: solid angle and projected solid angle \
+                within 1e-6/sqrt(2 e) of f64, or left to BSDF sampling below f32's resolution",
+        run: Run::On(sampled::near),
     },
     Case {
         id: 18,
@@ -46,8 +45,10 @@ pub(super) const CASES: &[Case] = &[
     Case {
         id: 20,
         name: "two strategies for one light",
-        setup: "multiple importance sampling",
-        run: Run::NotApplicable(NO_LIGHT_SAMPLING),
+        setup: "a lamp over a floor, radius 1e-5 to 1e6: no sample is blocked by the light's own \
+                limb; a lamp in a diffuse hollow sphere: both strategies together, and light \
+                sampling alone, give the exact radiance",
+        run: Run::On(sampled::strategies),
     },
     Case {
         id: 21,
@@ -114,7 +115,10 @@ fn furnace(context: &Context, radius: f64, measure: &mut Measure) -> Result<()> 
         .diffuse("wall", albedo, 1.0)
         .diffuse("ball", albedo, 1.0)
         .load(context)?;
+    // BSDF sampling, in which every direction hits: with light sampling the balls, which emit as well,
+    // would be found in two ways, whose sum has a variance.
     let settings = Settings {
+        integrator: Integrator::Bsdf,
         roulette: false,
         max_bounces: BOUNCES,
         ..context.settings(&scene, SIDE, 16)
@@ -240,7 +244,12 @@ fn two_sides(context: &Context, emissions: [f64; 2]) -> Result<(Scene, Settings)
             .sphere([x, -0.8, 0.0], 1.1, "gray");
     }
     let scene = text.load(context)?;
-    let settings = context.settings(&scene, SIDE, context.size(64, 256));
+    // Which light is sampled depends on how strong the others are: only by BSDF sampling do the paths
+    // not know of it.
+    let settings = Settings {
+        integrator: Integrator::Bsdf,
+        ..context.settings(&scene, SIDE, context.size(64, 256))
+    };
     Ok((scene, settings))
 }
 

@@ -16,6 +16,7 @@ mod intersection;
 mod lights;
 mod materials;
 mod placing;
+mod sampled;
 mod sampling;
 
 pub use context::Context;

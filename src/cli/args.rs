@@ -16,7 +16,8 @@ use crate::render::PILOT_SAMPLES;
 use crate::sampler::Sampler;
 use crate::scene::{MAX_BOUNCES, Scene};
 use crate::settings::{
-    DEFAULT_TERMINATION, GeometryChoice, Integrator, MAXIMUM_SPP, Offset, Rect, Settings,
+    DEFAULT_TERMINATION, GeometryChoice, Integrator, LightSampling, MAXIMUM_SPP, Offset, Rect,
+    Settings,
 };
 
 /// The options of `render`.
@@ -161,13 +162,22 @@ pub struct RenderArgs {
         long,
         value_name = "NAME",
         value_enum,
-        default_value = "bsdf",
+        default_value = "path",
         hide_possible_values = true,
         hide_default_value = true,
         help_heading = "Light transport",
-        help = "Estimator: path (BSDF and light sampling), bsdf, nee (light sampling alone), or lecture (uniform hemisphere, constant p) [default: bsdf]"
+        help = "Estimator: path (BSDF and light sampling), bsdf, nee (light sampling alone), or lecture (uniform hemisphere, constant p) [default: path]"
     )]
     pub integrator: IntegratorArg,
+    #[arg(
+        long,
+        value_name = "NAME",
+        value_enum,
+        hide_possible_values = true,
+        help_heading = "Light transport",
+        help = "Directions to lights: projected (by projected solid angle), or for comparison cone (by solid angle, lights by power) [default: projected]"
+    )]
+    pub light_sampling: Option<LightSamplingArg>,
     #[arg(
         long,
         value_name = "NAME",
@@ -268,7 +278,9 @@ choices! {
     /// `--progress`
     ProgressArg { Auto, Plain, Json, None }
     /// `--integrator`
-    IntegratorArg { Bsdf, Lecture, Path, Nee }
+    IntegratorArg { Path, Bsdf, Nee, Lecture }
+    /// `--light-sampling`
+    LightSamplingArg { Projected, Cone }
     /// `--sampler`
     SamplerArg { Sobol, Independent }
     /// `--roulette`
@@ -357,6 +369,18 @@ impl RenderArgs {
             IntegratorArg::Bsdf => settings.integrator = Integrator::Bsdf,
             IntegratorArg::Nee => settings.integrator = Integrator::Nee,
             IntegratorArg::Lecture => {}
+        }
+        if let Some(how) = self.light_sampling {
+            if lecture || settings.integrator == Integrator::Bsdf {
+                return Err(Error::Usage(format!(
+                    "--light-sampling says how path and nee sample lights: --integrator {} does not",
+                    settings.integrator.name()
+                )));
+            }
+            settings.light_sampling = match how {
+                LightSamplingArg::Projected => LightSampling::Projected,
+                LightSamplingArg::Cone => LightSampling::Cone,
+            };
         }
         if lecture && self.roulette.is_some() {
             return Err(Error::Usage(

@@ -11,7 +11,7 @@ use crate::allocation::{TILE, Tiles};
 use crate::effects::Effects;
 use crate::lights::Light;
 use crate::placement::{PlacedCamera, PlacedSphere, Placement};
-use crate::scene::{Material, MaterialKind, Scene, luminance};
+use crate::scene::{Material, MaterialKind, luminance};
 use crate::settings::Rect;
 
 /// `Sphere` of `shaders/scene/list.wesl`: a sphere about its centre.
@@ -62,6 +62,18 @@ impl PoleRecord {
     }
 }
 
+/// What the kernel weighs the placement's sphere `index` by as a light, in its unit; 0 for one that is
+/// not sampled.
+pub(crate) fn light_weight(index: usize, placement: &Placement, effects: &Effects) -> f64 {
+    placement
+        .lights
+        .of_sphere(index)
+        .map_or(0.0, |light| match effects.has("table") {
+            true => light.probability,
+            false => light.luminance * placement.light,
+        })
+}
+
 /// `Light` of `shaders/light/sphere.wesl`.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
@@ -69,29 +81,24 @@ impl PoleRecord {
 pub struct LightRecord {
     pub center: [f32; 3],
     pub radius: f32,
-    pub emission: [f32; 3],
-    pub probability: f32,
+    pub weight: f32,
     pub threshold: f32,
     pub other: u32,
     pub sphere: u32,
-    pub unused: u32,
 }
 
 impl LightRecord {
     /// The record of a light.
     #[must_use]
-    pub fn new(light: &Light, scene: &Scene, placement: &Placement) -> Self {
+    pub fn new(light: &Light, placement: &Placement, effects: &Effects) -> Self {
         let sphere = &placement.spheres[light.sphere];
-        let emission = scene.materials[sphere.material].emission * placement.light;
         Self {
             center: sphere.anchor.as_vec3().to_array(),
             radius: sphere.radius as f32,
-            emission: emission.as_vec3().to_array(),
-            probability: light.probability as f32,
+            weight: light_weight(light.sphere, placement, effects) as f32,
             threshold: light.threshold as f32,
             other: light.alias as u32,
             sphere: light.sphere as u32,
-            unused: 0,
         }
     }
 }

@@ -5,7 +5,7 @@ use wgpu::util::DeviceExt as _;
 use crate::containment::MOST_CORES;
 use crate::effects::Effects;
 use crate::error::{Error, Result};
-use crate::gpu::layout::{LightRecord, MaterialRecord, PoleRecord, SphereRecord};
+use crate::gpu::layout::{LightRecord, MaterialRecord, PoleRecord, SphereRecord, light_weight};
 use crate::placement::Placement;
 use crate::scene::Scene;
 use crate::shader::Kernel;
@@ -22,10 +22,10 @@ impl Uploads {
         effects: &Effects,
     ) -> Self {
         let mut all: Vec<(u32, &'static str, Vec<u8>)> = Vec::new();
-        if effects.has("lights") {
+        if kernel.has_binding(14) {
             let lights = placement.lights.table.iter();
             let records: Vec<LightRecord> = lights
-                .map(|light| LightRecord::new(light, scene, placement))
+                .map(|light| LightRecord::new(light, placement, effects))
                 .collect();
             all.push((14, "lights", bytemuck::cast_slice(&records).to_vec()));
         }
@@ -39,7 +39,7 @@ impl Uploads {
             .filter_map(|s| Some(PoleRecord::new(s, s.pole?)))
             .collect();
         let mut attributes: Vec<u32> = Vec::new();
-        for sphere in &placement.spheres {
+        for (index, sphere) in placement.spheres.iter().enumerate() {
             attributes.push(sphere.material as u32);
             if effects.has("interior") {
                 attributes.push(sphere.side as u32);
@@ -53,6 +53,9 @@ impl Uploads {
                 for other in std::iter::once(sphere.container).chain(cores) {
                     attributes.push(other.map_or(u32::MAX, |i| i as u32));
                 }
+            }
+            if effects.has("lights") {
+                attributes.push((light_weight(index, placement, effects) as f32).to_bits());
             }
         }
         all.push((0, "spheres", bytemuck::cast_slice(&spheres).to_vec()));

@@ -2,16 +2,16 @@
 
 use std::ops::Range;
 
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 use rayon::prelude::*;
 
-use super::bsdf::evaluate::evaluate;
+use super::bsdf::evaluate::{evaluate, has_density};
 use super::bsdf::sample::bsdf_sample;
 use super::bsdf::scatter::scatter;
 use super::core::random::{random4, sample_key};
 use super::core::sobol::sobol4;
 use super::light::environment_radiance;
-use super::light::sphere::{choose_light, light_density, power_weight, sample_cone};
+use super::light::sphere::{light_density, power_weight, sample_light};
 use super::scene::camera::camera_ray;
 use super::scene::priority::{cross_surface, relative_index};
 use super::scene::ray::{Hit, Ray, Vertex, leave, vertex_at};
@@ -84,6 +84,7 @@ impl PathTracer<'_> {
         let mut compression = 1.0;
         // pdf of the direction in which the path came; 0: light sampling could not have found it.
         let mut density = 0.0;
+        let mut reach = 0.0;
         loop {
             result.rays += 1;
             let Some(hit) = closest_hit(&ray, &placement.spheres) else {
@@ -92,7 +93,7 @@ impl PathTracer<'_> {
             };
             let sphere = &placement.spheres[hit.index];
             let material = &scene.materials[sphere.material];
-            let share = self.emission_share(&ray, &hit, density);
+            let share = self.emission_share(&ray, &hit, density, reach);
             result.radiance += throughput * share * material.emission;
             if result.bounces == settings.max_bounces {
                 result.cut = throughput;
@@ -112,9 +113,10 @@ impl PathTracer<'_> {
             );
             if self.samples_lights() {
                 let v = random(LIGHT_DIMENSION + result.bounces);
-                let (found, rays) = self.light_from(&ray, &hit, &vertex, v);
-                result.radiance += throughput * found;
-                result.rays += rays;
+                let found = self.light_from(&ray, &hit, &vertex, v);
+                result.radiance += throughput * found.radiance;
+                result.rays += found.rays;
+                reach = found.reach * vertex.normal.dot(s.direction).max(0.0);
             }
             density = s.density;
             throughput *= s.weight;
@@ -152,13 +154,16 @@ impl PathTracer<'_> {
 
     /// The share of the emission of a hit that the path counts, which came with `density`: light
     /// sampling has the rest.
-    fn emission_share(&self, ray: &Ray, hit: &Hit, density: f64) -> f64 {
-        let sphere = &self.placement.spheres[hit.index];
-        let emission = self.scene.materials[sphere.material].emission;
-        if !self.samples_lights() || density <= 0.0 {
+    fn emission_share(&self, ray: &Ray, hit: &Hit, density: f64, reach: f64) -> f64 {
+        let lights = &self.placement.lights;
+        let light = lights.of_sphere(hit.index);
+        let Some(light) = light.filter(|_| self.samples_lights() && density > 0.0) else {
             return 1.0;
-        }
-        let other = light_density(ray, hit, sphere, emission, &self.placement.lights);
+        };
+        let sphere = &self.placement.spheres[hit.index];
+        let w = (sphere.anchor - ray.anchor) - ray.offset;
+        let reach = (!lights.from_table(self.settings.light_sampling)).then_some(reach);
+        let other = light_density(light, w, sphere.radius, reach);
         match self.settings.integrator {
             Integrator::Path => power_weight(density, other),
             _ if other > 0.0 => 0.0,
@@ -166,44 +171,51 @@ impl PathTracer<'_> {
         }
     }
 
-    /// What one light, chosen at random, sends over a vertex into the path, and the rays it took.
-    fn light_from(&self, ray: &Ray, hit: &Hit, vertex: &Vertex, u: [f64; 4]) -> (DVec3, u32) {
-        let nothing = (DVec3::ZERO, 0);
+    /// What one light, chosen at random, sends over a vertex into the path.
+    fn light_from(&self, ray: &Ray, hit: &Hit, vertex: &Vertex, u: [f64; 4]) -> LightFound {
+        let mut found = LightFound::default();
         let spheres = &self.placement.spheres;
         let material = |index: usize| &self.scene.materials[spheres[index].material];
-        let Some(light) = choose_light(&self.placement.lights, [u[2], u[3]]) else {
-            return nothing;
-        };
-        let target = &spheres[light.sphere];
-        let w = (target.anchor - vertex.anchor) - vertex.offset;
-        let place = DVec2::new(u[0], u[1]);
-        let sample = sample_cone(light.probability, target.radius, w, place);
-        let Some((direction, density)) = sample else {
-            return nothing;
-        };
         let kind = &material(hit.index).kind;
-        let Some((value, other)) = evaluate(kind, vertex.normal, ray.direction, direction) else {
-            return nothing;
-        };
-        if light.sphere == hit.index || other <= 0.0 {
-            return nothing;
+        if !has_density(kind) {
+            return found;
         }
-        let s = bsdf_sample(direction, DVec3::ONE);
-        let shadow = leave(ray.clone(), hit, vertex, &s, self.placement.offset);
+        let sampling = self.settings.light_sampling;
+        let Some(s) = sample_light(self.placement, sampling, vertex, hit.index, u) else {
+            return found;
+        };
+        found.reach = s.reach;
+        let Some((value, other)) = evaluate(kind, vertex.normal, ray.direction, s.direction) else {
+            return found;
+        };
+        if s.density <= 0.0 || other <= 0.0 {
+            return found;
+        }
+        let direction = bsdf_sample(s.direction, DVec3::ONE);
+        let shadow = leave(ray.clone(), hit, vertex, &direction, self.placement.offset);
         // A ray that misses the limb by a rounding has seen the light all the same.
-        let limb = w.dot(direction);
+        let limb = s.w.dot(s.direction);
         let hidden = closest_hit(&shadow, spheres)
-            .is_some_and(|first| first.index != light.sphere && first.t < limb);
+            .is_some_and(|first| first.index != s.sphere && first.t < limb);
+        found.rays = 1;
         if hidden {
-            return (DVec3::ZERO, 1);
+            return found;
         }
         let weight = match self.settings.integrator {
-            Integrator::Path => power_weight(density, other),
+            Integrator::Path => power_weight(s.rival, other),
             _ => 1.0,
         };
-        let emission = material(light.sphere).emission;
-        (weight / density * value * emission, 1)
+        found.radiance = weight / s.density * value * material(s.sphere).emission;
+        found
     }
+}
+
+/// What light sampling found at a vertex.
+#[derive(Clone, Copy, Debug, Default)]
+struct LightFound {
+    radiance: DVec3,
+    rays: u32,
+    reach: f64,
 }
 
 fn ior_of(kind: &MaterialKind) -> f64 {

@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use glam::DVec3;
 
 use crate::effects::Effects;
-use crate::gpu::layout::MaterialRecord;
+use crate::gpu::layout::{MaterialRecord, light_weight};
 use crate::placement::{PlacedSphere, Placement, Side};
 use crate::scene::Scene;
 
@@ -43,9 +43,16 @@ pub(super) fn geometry(scene: &Scene, placement: &Placement, effects: &Effects) 
             text += &format!("import package::scene::{name};\n");
         }
     }
+    if effects.has("lights") && !effects.has("table") {
+        text += "import package::scene::ray::Vertex;\n\
+                 import package::light::sphere::{Weighed, weigh};\n";
+    }
     closest_hit(&mut text, placement, effects);
     frame_of(&mut text, placement, effects);
     material_of(&mut text, scene, placement, effects);
+    if effects.has("lights") {
+        light_weights(&mut text, placement, effects);
+    }
     text
 }
 
@@ -192,4 +199,30 @@ fn material_of(text: &mut String, scene: &Scene, placement: &Placement, effects:
         choose(text, "level", &levels);
         *text += "return level;\n}\n";
     }
+}
+
+/// What spheres count for as lights, and unless they are drawn from a table, their weighing.
+fn light_weights(text: &mut String, placement: &Placement, effects: &Effects) {
+    let weight = |i: usize| number(light_weight(i, placement, effects));
+    let weights: Vec<String> = (0..placement.spheres.len()).map(weight).collect();
+    *text += "fn light_weight(index: u32) -> f32 {\nvar weight: f32;\n";
+    choose(text, "weight", &weights);
+    *text += "return weight;\n}\n";
+    if effects.has("table") {
+        return;
+    }
+    *text += "fn weigh_lights(vertex: Vertex, own: u32, u: f32) -> Weighed {\n\
+              var chosen: Weighed;\nchosen.v = u;\n";
+    for light in &placement.lights.table {
+        let sphere = &placement.spheres[light.sphere];
+        let _ = writeln!(
+            text,
+            "chosen = weigh(chosen, vertex, own, {}, {}, {}, {}u);",
+            vector(sphere.anchor),
+            number(sphere.radius),
+            weights[light.sphere],
+            light.sphere
+        );
+    }
+    *text += "return chosen;\n}\n";
 }

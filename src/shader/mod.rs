@@ -159,7 +159,16 @@ pub fn ray_steps(placement: &Placement, effects: &Effects) -> u32 {
     let ray = placement.poles + others.div_ceil(8) + 2;
     let rays = if effects.has("lights") { 2 } else { 1 };
     // And the path loop's own.
-    (rays * ray + 1) as u32
+    (rays * ray + 1 + light_steps(placement, effects)) as u32
+}
+
+/// Loop iterations to choose a light, with one to leave the loop.
+fn light_steps(placement: &Placement, effects: &Effects) -> usize {
+    if effects.has("lights") && effects.has("list") && !effects.has("table") {
+        placement.lights.table.len() + 1
+    } else {
+        0
+    }
 }
 
 /// The module `config`: sizes and constants of this scene.
@@ -180,12 +189,8 @@ fn config(scene: &Scene, placement: &Placement, effects: &Effects) -> String {
         text += &format!("const ENVIRONMENT: vec3f = {};\n", baked::vector(radiance));
     }
     if effects.has("lights") {
-        let lights = &placement.lights;
-        text += &format!(
-            "const LIGHT_COUNT: u32 = {}u;\nconst LIGHT_SHARE: f32 = {};\n",
-            lights.table.len().max(1),
-            baked::number(lights.share / placement.light)
-        );
+        let count = placement.lights.table.len().max(1);
+        text += &format!("const LIGHT_COUNT: u32 = {count}u;\n");
     }
     if effects.has("nudge") {
         let [back, out] = placement.offset.distances().unwrap_or_default();

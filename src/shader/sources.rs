@@ -30,5 +30,6 @@ sources![
     "bsdf/reflective",
     "bsdf/evaluate",
     "light/environment",
+    "light/projected",
     "light/sphere",
 ];

@@ -7,6 +7,15 @@ use glam::DVec3;
 use super::reflective::{Reflective, eval_reflective, in_lobe, lobe_probability, pdf_reflective};
 use crate::scene::MaterialKind;
 
+/// Whether light sampling can help: there is something besides delta lobes.
+#[must_use]
+pub fn has_density(material: &MaterialKind) -> bool {
+    !matches!(
+        material,
+        MaterialKind::Mirror { .. } | MaterialKind::Dielectric { .. }
+    )
+}
+
 /// f cos of the direction `w`, and the pdf in solid angle with which the material samples it; `None`
 /// for a material of delta lobes.
 #[must_use]

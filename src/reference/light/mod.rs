@@ -1,5 +1,6 @@
 //! Twins of `shaders/light/`.
 
+pub mod projected;
 pub mod sphere;
 
 use glam::DVec3;

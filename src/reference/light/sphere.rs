@@ -4,15 +4,16 @@ use std::f64::consts::TAU;
 
 use glam::{DVec2, DVec3};
 
+use super::projected::{cap_seen, sample_cap};
 use crate::lights::{Light, Lights};
-use crate::placement::PlacedSphere;
+use crate::placement::Placement;
 use crate::reference::core::sampling::cap_direction;
-use crate::reference::scene::ray::{Hit, Ray};
-use crate::scene::luminance;
+use crate::reference::scene::ray::Vertex;
+use crate::settings::LightSampling;
 
 /// The light that the alias table gives; `None` if there is none.
 #[must_use]
-pub fn choose_light(lights: &Lights, u: [f64; 2]) -> Option<&Light> {
+pub fn light_from_table(lights: &Lights, u: [f64; 2]) -> Option<&Light> {
     let count = lights.table.len();
     let place = ((u[0] * count as f64) as usize).min(count.checked_sub(1)?);
     let light = &lights.table[place];
@@ -30,37 +31,131 @@ pub fn cone_height(ww: f64, radius: f64) -> f64 {
     ss / (1.0 + (1.0 - ss).max(0.0).sqrt())
 }
 
-/// pdf in solid angle with which light sampling at the ray's origin finds its direction; 0 for a
-/// sphere that is not sampled.
+/// For MIS, the density in solid angle with which light sampling finds a direction to `light`, whose
+/// centre is at `w`; `reach` as in the kernel, `None` where lights are drawn from the table.
 #[must_use]
-pub fn light_density(
-    ray: &Ray,
-    hit: &Hit,
-    sphere: &PlacedSphere,
-    emission: DVec3,
-    lights: &Lights,
-) -> f64 {
-    let w = (sphere.anchor - ray.anchor) - ray.offset;
+pub fn light_density(light: &Light, w: DVec3, radius: f64, reach: Option<f64>) -> f64 {
     let ww = w.length_squared();
-    let radius = sphere.radius;
-    if sphere.pole.is_some() || hit.inside || ww <= radius * radius {
+    if ww <= radius * radius {
         return 0.0;
     }
-    let share = radius * radius * luminance(emission) * lights.share;
-    share / (TAU * cone_height(ww, radius))
+    match reach {
+        Some(reach) => light.luminance * reach,
+        None => light.probability / (TAU * cone_height(ww, radius)),
+    }
 }
 
-/// A direction to a sphere, uniform in the cone that it fills, and its pdf in solid angle for a light
-/// that is chosen with this probability; `w` goes from the vertex to the centre. `None` from within.
+/// A direction to a sphere, uniform in the cone that it fills, and its pdf in solid angle; `w` goes from
+/// the vertex to the centre. `None` from within.
 #[must_use]
-pub fn sample_cone(probability: f64, radius: f64, w: DVec3, u: DVec2) -> Option<(DVec3, f64)> {
+pub fn sample_cone(w: DVec3, radius: f64, u: DVec2) -> Option<(DVec3, f64)> {
     let ww = w.length_squared();
     if ww <= radius * radius {
         return None;
     }
     let height = cone_height(ww, radius);
     let direction = cap_direction(w / ww.sqrt(), height, u);
-    Some((direction, probability / (TAU * height)))
+    Some((direction, 1.0 / (TAU * height)))
+}
+
+/// A direction to a light; see the kernel's struct.
+#[derive(Clone, Copy, Debug)]
+#[expect(missing_docs, reason = "the members are those of the kernel's struct")]
+pub struct LightSample {
+    pub direction: DVec3,
+    pub density: f64,
+    pub rival: f64,
+    pub w: DVec3,
+    pub sphere: usize,
+    pub reach: f64,
+}
+
+/// A direction to a light, for a vertex on the placement's sphere `own`; `None` if it sees none.
+#[must_use]
+pub fn sample_light(
+    placement: &Placement,
+    sampling: LightSampling,
+    vertex: &Vertex,
+    own: usize,
+    u: [f64; 4],
+) -> Option<LightSample> {
+    let lights = &placement.lights;
+    let place = DVec2::new(u[0], u[1]);
+    let to = |light: &Light| {
+        let target = &placement.spheres[light.sphere];
+        let w = (target.anchor - vertex.anchor) - vertex.offset;
+        (w, target.radius)
+    };
+    if !lights.from_table(sampling) {
+        return weighed_light(lights, vertex, own, u, &to);
+    }
+    let light = light_from_table(lights, [u[2], u[3]])?;
+    let (w, radius) = to(light);
+    let (direction, density) = match sampling {
+        LightSampling::Cone => sample_cone(w, radius, place)?,
+        LightSampling::Projected => {
+            let cap = cap_seen(w, radius, vertex.normal);
+            if cap.area <= 0.0 {
+                return None;
+            }
+            let (direction, extent) = sample_cap(&cap, w, vertex.normal, place);
+            (direction, vertex.normal.dot(direction).max(0.0) / extent)
+        }
+    };
+    (light.sphere != own).then(|| LightSample {
+        direction,
+        density: light.probability * density,
+        rival: light_density(light, w, radius, None),
+        w,
+        sphere: light.sphere,
+        reach: 0.0,
+    })
+}
+
+/// The same; the light is chosen by the irradiance that it sends if nothing is in between.
+fn weighed_light(
+    lights: &Lights,
+    vertex: &Vertex,
+    own: usize,
+    u: [f64; 4],
+    to: &dyn Fn(&Light) -> (DVec3, f64),
+) -> Option<LightSample> {
+    let mut total = 0.0;
+    let mut chosen = None;
+    let mut v = u[2];
+    for light in &lights.table {
+        let (w, radius) = to(light);
+        let cap = cap_seen(w, radius, vertex.normal);
+        let strength = if light.sphere == own {
+            0.0
+        } else {
+            light.luminance * cap.area
+        };
+        total += strength;
+        let share = if strength > 0.0 {
+            strength / total
+        } else {
+            0.0
+        };
+        if v < share {
+            v /= share;
+            chosen = Some((light, w, cap, strength));
+        } else {
+            v = ((v - share) / (1.0 - share)).min(1.0 - f64::EPSILON);
+        }
+    }
+    let (light, w, cap, strength) = chosen?;
+    let reach = 1.0 / total;
+    let (direction, extent) = sample_cap(&cap, w, vertex.normal, DVec2::new(u[0], u[1]));
+    let cosine = vertex.normal.dot(direction).max(0.0);
+    Some(LightSample {
+        direction,
+        density: strength * reach * cosine / extent,
+        rival: light.luminance * reach * cosine,
+        w,
+        sphere: light.sphere,
+        reach,
+    })
 }
 
 /// Weight of an estimate whose direction has density `a`, against another way with density `b`.
