@@ -158,6 +158,16 @@ impl Effects {
                 reasons: when(settings.sampler == Sampler::Sobol, "sampler sobol".into()),
             },
             Effect {
+                name: "classes",
+                what: "light by the kind of its path",
+                reasons: when(settings.classes, "--aov".into()),
+            },
+            Effect {
+                name: "features",
+                what: "normal, albedo and depth of what is seen first",
+                reasons: when(settings.features, "--aov".into()),
+            },
+            Effect {
                 name: "adaptive",
                 what: "samples of some tiles of the image only",
                 reasons: when(settings.adaptive, "--adaptive".into()),

@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use crate::allocation::Allocation;
+use crate::aov::AovSums;
 use crate::settings::Rect;
 
 /// Samples a block: f32 sums run over one block, and every batch, whose spread gives the error
@@ -53,6 +54,8 @@ pub struct Window {
     pub batch: u64,
     /// One entry a pixel, rows from the top; zeros where a tile was not asked for.
     pub pixels: Vec<PixelSums>,
+    /// The same of what was asked for beside the image; empty if that is nothing.
+    pub aovs: Vec<AovSums>,
     /// What else happened.
     pub tally: Tally,
 }
@@ -111,6 +114,8 @@ pub struct Film {
     sum: Vec<[f64; 3]>,
     /// Estimated variance of the covered samples' sum.
     variance: Vec<[f64; 3]>,
+    /// Empty until a window has some.
+    aovs: Vec<AovSums>,
     tally: Tally,
     /// The paths that the tally is of.
     paths: u64,
@@ -155,6 +160,7 @@ impl Film {
             allocation,
             sum: vec![[0.0; 3]; pixels],
             variance: vec![[0.0; 3]; pixels],
+            aovs: Vec::new(),
             tally: Tally::default(),
             paths: 0,
         }
@@ -193,6 +199,12 @@ impl Film {
             for c in 0..3 {
                 self.sum[i][c] += pixel.sum[c];
                 self.variance[i][c] += scale * pixel.m2[c];
+            }
+        }
+        self.aovs.resize(window.aovs.len(), AovSums::default());
+        for (i, (sums, more)) in self.aovs.iter_mut().zip(&window.aovs).enumerate() {
+            if self.allocation.step(i) == step {
+                sums.add(more);
             }
         }
         let level = &mut self.levels[usize::from(step)];
@@ -314,6 +326,12 @@ impl Film {
     #[must_use]
     pub fn freedom_of(&self, i: usize) -> Option<f64> {
         self.level(i).freedom()
+    }
+
+    /// The sums of what pixel `i` has beside its light; `None` if nothing was asked for.
+    #[must_use]
+    pub fn aovs(&self, i: usize) -> Option<&AovSums> {
+        self.aovs.get(i)
     }
 
     /// The means as linear f32, rows from the top.

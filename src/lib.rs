@@ -14,7 +14,7 @@
 //! 7. [`gpu`] and [`reference`](mod@reference): two renderers, wgpu in f32 and the CPU in f64, that
 //!    trace the same paths. [`backend`]: one of them, opened.
 //! 8. [`render`]: the loop that asks a renderer for windows of samples until a stop rule holds.
-//! 9. [`film`]: f64 sums and variances over all windows.
+//! 9. [`film`]: f64 sums and variances over all windows. [`aov`]: what it can hold beside the image.
 //! 10. [`estimate`] and [`allocation`]: mean and error; where further samples go. [`forecast`]: what an
 //!     error will cost, from a pilot. [`ledger`]: how much light inexact settings took.
 //! 11. [`output`]: images, statistics, progress.
@@ -24,6 +24,7 @@
 //! [`error`] is what can go wrong anywhere.
 
 pub mod allocation;
+pub mod aov;
 pub mod backend;
 pub mod check;
 pub mod cli;

@@ -43,6 +43,10 @@ pub struct Settings {
     pub offset: Offset,
     /// Whether a pilot decides where samples go; `samples` are then those a pixel on average, with it.
     pub adaptive: bool,
+    /// Keep the light of each [kind of path](crate::aov::LightClass) by itself.
+    pub classes: bool,
+    /// Keep normal, albedo and depth of what is seen first.
+    pub features: bool,
     /// Stop when the estimated error is at most this.
     pub error: Option<f64>,
     /// Stop when rendering has taken this long.
@@ -72,6 +76,8 @@ impl Settings {
             geometry: GeometryChoice::Auto,
             offset: Offset::Exact,
             adaptive: false,
+            classes: false,
+            features: false,
             error: None,
             time: None,
         }

@@ -39,6 +39,7 @@ fn pilot(rect: Rect, sample: impl Fn(u32, u32) -> (f64, f64)) -> Film {
         samples: 0..64,
         batch: 4,
         pixels: (0..rect.pixels()).map(pixel).collect(),
+        aovs: Vec::new(),
         tally: Tally::default(),
     });
     film

@@ -19,7 +19,7 @@ use rayon::prelude::*;
 type Set = BTreeSet<&'static str>;
 
 /// All effects, in the table's order.
-const ALL: [&str; 25] = [
+const ALL: [&str; 27] = [
     "baked",
     "list",
     "pole",
@@ -30,6 +30,8 @@ const ALL: [&str; 25] = [
     "ulp",
     "lens",
     "sobol",
+    "classes",
+    "features",
     "adaptive",
     "diffuse",
     "mirror",
@@ -65,7 +67,7 @@ const MATERIALS: [&str; 4] = ["diffuse", "mirror", "dielectric", "reflective"];
 
 /// Effects that must leave no trace in the WGSL where they are not in use, in any case, not even as
 /// a part of a name.
-const WORDS: [&str; 20] = [
+const WORDS: [&str; 22] = [
     "diffuse",
     "mirror",
     "dielectric",
@@ -73,6 +75,8 @@ const WORDS: [&str; 20] = [
     "reflective",
     "lens",
     "sobol",
+    "classes",
+    "features",
     "adaptive",
     "environment",
     "emission",
@@ -239,6 +243,8 @@ fn asking_for(set: &Set) -> (Scene, Settings) {
         },
         roulette: has("roulette"),
         adaptive: has("adaptive"),
+        classes: has("classes"),
+        features: has("features"),
         sampler: if has("sobol") {
             Sampler::Sobol
         } else {
@@ -431,10 +437,12 @@ fn every_possible_set() {
         "mis",
         "sobol",
         "adaptive",
+        "classes",
+        "features",
     ];
     let common: Vec<&'static str> = ALL.into_iter().filter(|n| !rare.contains(n)).collect();
     let every = (0..1 << common.len()).map(|bits| subset(&common, bits));
-    let some = (0..4000u32).map(|i| subset(&ALL, i.wrapping_mul(0x9e37_79b9) >> 8));
+    let some = (0..4000u32).map(|i| subset(&ALL, i.wrapping_mul(0x9e37_79b9) >> (32 - ALL.len())));
     let sets: BTreeSet<Set> = every.chain(some).filter(possible).collect();
     eprintln!("{} sets", sets.len());
     check(&sets);

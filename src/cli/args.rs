@@ -55,7 +55,7 @@ pub struct RenderArgs {
         value_delimiter = ',',
         help_heading = "Output",
         hide_possible_values = true,
-        help = "Layers of EXR files beside the image, as in stderr,samples: stderr (standard errors), samples (how many)"
+        help = "Layers of EXR files beside the image, as in stderr,normal: stderr, samples; emission, direct, indirect, specular, caustic (the image by kinds of paths); normal, albedo, depth"
     )]
     pub aov: Vec<Aov>,
     #[arg(
@@ -406,6 +406,8 @@ impl RenderArgs {
         }
         settings.offset = self.offset;
         settings.adaptive = self.adaptive;
+        settings.classes = self.aov.iter().any(|aov| aov.class().is_some());
+        settings.features = self.aov.iter().any(|aov| aov.is_feature());
         let least = 2 * PILOT_SAMPLES;
         if self.adaptive && settings.samples.end < least {
             return Err(Error::Usage(format!(

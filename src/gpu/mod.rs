@@ -1,5 +1,6 @@
 //! The GPU: adapters, buffer layouts, and the renderer.
 
+mod aov;
 pub mod device;
 pub mod layout;
 pub mod probe;

@@ -8,9 +8,11 @@ use bytemuck::Zeroable as _;
 use wgpu::util::DeviceExt as _;
 
 use crate::allocation::{TILE, Tiles};
+use crate::aov::AovSums;
 use crate::effects::Effects;
 use crate::error::{Error, Result};
 use crate::film::{BLOCK, NonFinite, PixelSums, Tally, Window};
+use crate::gpu::aov::AovLayout;
 use crate::gpu::device::Gpu;
 use crate::gpu::layout::{CameraRecord, ChosenTiles, CountersRecord, DispatchRecord};
 use crate::gpu::upload::Uploads;
@@ -63,6 +65,7 @@ pub struct GpuRenderer {
     work: wgpu::Buffer,
     chosen: wgpu::Buffer,
     counters: wgpu::Buffer,
+    aovs: Option<Aovs>,
     region: RegionTargets,
     /// Kernel radiance per radiance.
     light: f64,
@@ -73,6 +76,14 @@ pub struct GpuRenderer {
     step_limit: u32,
     /// Of all buffers and textures.
     device_bytes: u64,
+}
+
+/// Sums beside the image, if the kernel keeps any: they are among the partial sums.
+#[derive(Debug)]
+struct Aovs {
+    layout: AovLayout,
+    partials: wgpu::Buffer,
+    staging: wgpu::Buffer,
 }
 
 /// Textures that the kernel writes and buffers through which they are read.
@@ -131,7 +142,8 @@ impl GpuRenderer {
         let partials_size = pixels * u64::from(partial_size);
         let storage = Uploads::new(&kernel, scene, placement, effects);
         storage.check(&gpu.limits, partials_size)?;
-        let partials = buffer("partials", partials_size, wgpu::BufferUsages::STORAGE);
+        let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
+        let partials = buffer("partials", partials_size, usage);
         let counter_usage = wgpu::BufferUsages::STORAGE
             | wgpu::BufferUsages::COPY_SRC
             | wgpu::BufferUsages::COPY_DST;
@@ -195,7 +207,17 @@ impl GpuRenderer {
         });
         gpu.check()?;
         let uploads: u64 = uploaded.iter().map(|(_, buffer)| buffer.size()).sum();
-        let device_bytes = uploads + partials.size() + region.bytes();
+        let aovs = AovLayout::of(&kernel, placement).map(|layout| Aovs {
+            layout,
+            staging: buffer(
+                "staging",
+                partials_size,
+                wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
+            ),
+            partials: partials.clone(),
+        });
+        let staged = aovs.as_ref().map_or(0, |a| a.staging.size());
+        let device_bytes = uploads + partials.size() + staged + region.bytes();
         // A path that is begun must fit.
         let path = (u64::from(settings.max_bounces) + 1) * u64::from(ray_steps(placement, effects));
         let step_limit = LOOP_ITERATIONS.saturating_sub(path).max(1) as u32;
@@ -210,6 +232,7 @@ impl GpuRenderer {
             work,
             chosen,
             counters,
+            aovs,
             region,
             light: placement.light,
             rate: 1.0e6,
@@ -483,6 +506,38 @@ impl GpuRenderer {
     }
 }
 
+impl GpuRenderer {
+    /// What the kernel has kept beside the image for `region`; nothing if it was not asked to.
+    fn read_aovs(&self, region: Rect, chosen: Option<&ChosenTiles>) -> Result<Vec<AovSums>> {
+        let Some(aovs) = &self.aovs else {
+            return Ok(Vec::new());
+        };
+        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+        encoder.copy_buffer_to_buffer(&aovs.partials, 0, &aovs.staging, 0, aovs.staging.size());
+        self.gpu.queue.submit([encoder.finish()]);
+        // Whether it worked shows when the range is taken.
+        aovs.staging.map_async(wgpu::MapMode::Read, .., |_| ());
+        self.gpu.wait()?;
+        let mut sums = {
+            let bytes = aovs
+                .staging
+                .get_mapped_range(..)
+                .map_err(|e| self.lost(&e))?;
+            aovs.layout.read(&bytes, region)
+        };
+        aovs.staging.unmap();
+        let across = region.width.div_ceil(TILE);
+        for (i, sums) in (0..).zip(&mut sums) {
+            let tile = i / region.width / TILE * across + i % region.width / TILE;
+            // Elsewhere the buffer holds what was before.
+            if !chosen.is_none_or(|c| c.has(tile)) {
+                *sums = AovSums::default();
+            }
+        }
+        Ok(sums)
+    }
+}
+
 impl Renderer for GpuRenderer {
     fn device(&self) -> (String, String, String) {
         let s = &self.gpu.summary;
@@ -500,6 +555,10 @@ impl Renderer for GpuRenderer {
             batch: self.sampler.batch(samples.start),
             samples,
             pixels: vec![PixelSums::default(); self.crop.pixels()],
+            aovs: match self.aovs {
+                Some(_) => vec![AovSums::default(); self.crop.pixels()],
+                None => Vec::new(),
+            },
             tally: Tally::default(),
         };
         if tiles.is_some() && !self.kernel.has_binding(15) {
@@ -519,11 +578,16 @@ impl Renderer for GpuRenderer {
             let chosen = chosen.as_ref();
             window.samples.end = self.render_region(region, wanted, chosen, i == 0, control)?;
             let (pixels, tally) = self.read(region, &window.samples, chosen)?;
+            let aovs = self.read_aovs(region, chosen)?;
             window.tally.add(&tally);
             for (y, row) in pixels.chunks(region.width as usize).enumerate() {
                 let line = (region.y - self.crop.y) as usize + y;
                 let from = line * self.crop.width as usize + (region.x - self.crop.x) as usize;
                 window.pixels[from..from + row.len()].copy_from_slice(row);
+                if self.aovs.is_some() {
+                    let row = &aovs[y * row.len()..(y + 1) * row.len()];
+                    window.aovs[from..from + row.len()].copy_from_slice(row);
+                }
             }
         }
         Ok(window)

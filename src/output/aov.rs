@@ -1,6 +1,7 @@
 //! What an EXR file can hold beside the image (`--aov`), and its values.
 
 use super::Layer;
+use crate::aov::{AovSums, LightClass};
 use crate::estimate::Estimate;
 use crate::film::Film;
 
@@ -11,6 +12,22 @@ pub enum Aov {
     Stderr,
     /// Samples of the pixel.
     Samples,
+    /// The image's light that is seen itself.
+    Emission,
+    /// The image's light from what lights shine on directly.
+    Direct,
+    /// The image's light that goes from one diffuse surface to another.
+    Indirect,
+    /// The image's light that is seen in mirrors and glass.
+    Specular,
+    /// The image's light on diffuse surfaces that comes from mirrors or through glass.
+    Caustic,
+    /// Mean unit normal of what is seen first, on the viewer's side; 0 where nothing is seen.
+    Normal,
+    /// Mean colour of what is seen first: albedo or reflectance, 1 for glass.
+    Albedo,
+    /// Mean distance along the view axis of what is seen first, in scene units; infinite where nothing is.
+    Depth,
 }
 
 impl Aov {
@@ -20,6 +37,14 @@ impl Aov {
         match self {
             Self::Stderr => "stderr",
             Self::Samples => "samples",
+            Self::Emission => "emission",
+            Self::Direct => "direct",
+            Self::Indirect => "indirect",
+            Self::Specular => "specular",
+            Self::Caustic => "caustic",
+            Self::Normal => "normal",
+            Self::Albedo => "albedo",
+            Self::Depth => "depth",
         }
     }
 
@@ -27,8 +52,46 @@ impl Aov {
     #[must_use]
     pub fn channels(self) -> &'static [&'static str] {
         match self {
-            Self::Stderr => &["R", "G", "B"],
             Self::Samples => &["N"],
+            Self::Normal => &["X", "Y", "Z"],
+            Self::Depth => &["Z"],
+            _ => &["R", "G", "B"],
+        }
+    }
+
+    /// The kind of paths whose light it is; `None` if it is not light.
+    #[must_use]
+    pub fn class(self) -> Option<LightClass> {
+        match self {
+            Self::Emission => Some(LightClass::Emission),
+            Self::Direct => Some(LightClass::Direct),
+            Self::Indirect => Some(LightClass::Indirect),
+            Self::Specular => Some(LightClass::Specular),
+            Self::Caustic => Some(LightClass::Caustic),
+            _ => None,
+        }
+    }
+
+    /// Whether it is about what is seen first.
+    #[must_use]
+    pub fn is_feature(self) -> bool {
+        matches!(self, Self::Normal | Self::Albedo | Self::Depth)
+    }
+
+    /// The means of its values in `film`, for pixel `i`.
+    fn means(self, film: &Film, i: usize) -> Vec<f32> {
+        let none = AovSums::default();
+        let sums = film.aovs(i).unwrap_or(&none);
+        let mean = |sum: [f64; 3]| sum.map(|x| (x / film.samples_of(i) as f64) as f32).to_vec();
+        if let Some(class) = self.class() {
+            return mean(sums.classes[class as usize]);
+        }
+        match self {
+            Self::Normal => mean(sums.normal),
+            Self::Albedo => mean(sums.albedo),
+            Self::Depth if sums.hits == 0.0 => vec![f32::INFINITY],
+            Self::Depth => vec![(sums.depth / sums.hits) as f32],
+            _ => Vec::new(),
         }
     }
 }
@@ -54,6 +117,7 @@ impl Plane {
                 .map(|v| v.sqrt() as f32)
                 .collect(),
             Aov::Samples => pixels.map(|i| film.samples_of(i) as f32).collect(),
+            _ => pixels.flat_map(|i| aov.means(film, i)).collect(),
         };
         Self { aov, values }
     }

@@ -6,6 +6,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::bsdf::evaluate::{evaluate, has_density};
+use super::bsdf::event::{is_specular, next_class};
 use super::bsdf::sample::bsdf_sample;
 use super::bsdf::scatter::scatter;
 use super::core::random::{random4, sample_key};
@@ -17,6 +18,7 @@ use super::scene::priority::{cross_surface, relative_index};
 use super::scene::ray::{Hit, Ray, Vertex, leave, vertex_at};
 use super::scene::sphere::closest_hit;
 use crate::allocation::Tiles;
+use crate::aov::{AovSums, LightClass};
 use crate::error::{Error, Result};
 use crate::film::{BLOCK, NonFinite, PixelSums, Tally, Window};
 use crate::media::Medium;
@@ -46,6 +48,16 @@ pub struct PathResult {
     pub bounces: u32,
     /// Throughput with which the bounce limit cut the path; zero if it did not.
     pub cut: DVec3,
+    /// Its share of what was asked for beside the image.
+    pub aovs: AovSums,
+}
+
+impl PathResult {
+    fn add(&mut self, class: LightClass, radiance: DVec3) {
+        self.radiance += radiance;
+        let sum = &mut self.aovs.classes[class as usize];
+        *sum = (DVec3::from(*sum) + radiance).to_array();
+    }
 }
 
 /// All that a path needs to know.
@@ -85,16 +97,25 @@ impl PathTracer<'_> {
         // pdf of the direction in which the path came; 0: light sampling could not have found it.
         let mut density = 0.0;
         let mut reach = 0.0;
+        let mut class = LightClass::Emission;
         loop {
             result.rays += 1;
             let Some(hit) = closest_hit(&ray, &placement.spheres) else {
-                result.radiance += throughput * environment_radiance(scene);
+                result.add(class, throughput * environment_radiance(scene));
                 return result;
             };
             let sphere = &placement.spheres[hit.index];
             let material = &scene.materials[sphere.material];
             let share = self.emission_share(&ray, &hit, density, reach);
-            result.radiance += throughput * share * material.emission;
+            result.add(class, throughput * share * material.emission);
+            if result.bounces == 0 {
+                let normal = vertex_at(&ray, &hit, sphere).normal;
+                let depth = hit.t * ray.direction.dot(placement.camera.forward);
+                result.aovs.normal = normal.to_array();
+                result.aovs.albedo = color(&material.kind).to_array();
+                result.aovs.depth = (placement.camera.approach + depth) / placement.scale;
+                result.aovs.hits = 1.0;
+            }
             if result.bounces == settings.max_bounces {
                 result.cut = throughput;
                 return result;
@@ -114,10 +135,20 @@ impl PathTracer<'_> {
             if self.samples_lights() {
                 let v = random(LIGHT_DIMENSION + result.bounces);
                 let found = self.light_from(&ray, &hit, &vertex, v);
-                result.radiance += throughput * found.radiance;
+                let specular = is_specular(
+                    &material.kind,
+                    vertex.normal,
+                    ray.direction,
+                    found.direction,
+                );
+                result.add(next_class(class, specular), throughput * found.radiance);
                 result.rays += found.rays;
                 reach = found.reach * vertex.normal.dot(s.direction).max(0.0);
             }
+            class = next_class(
+                class,
+                is_specular(&material.kind, vertex.normal, ray.direction, s.direction),
+            );
             density = s.density;
             throughput *= s.weight;
             compression *= s.compression;
@@ -185,6 +216,7 @@ impl PathTracer<'_> {
             return found;
         };
         found.reach = s.reach;
+        found.direction = s.direction;
         let Some((value, other)) = evaluate(kind, vertex.normal, ray.direction, s.direction) else {
             return found;
         };
@@ -213,9 +245,19 @@ impl PathTracer<'_> {
 /// What light sampling found at a vertex.
 #[derive(Clone, Copy, Debug, Default)]
 struct LightFound {
+    direction: DVec3,
     radiance: DVec3,
     rays: u32,
     reach: f64,
+}
+
+/// Albedo or reflectance; glass has 1.
+fn color(kind: &MaterialKind) -> DVec3 {
+    match *kind {
+        MaterialKind::Diffuse { albedo } | MaterialKind::Reflective { albedo, .. } => albedo,
+        MaterialKind::Mirror { reflectance } => reflectance,
+        MaterialKind::Dielectric { .. } => DVec3::ONE,
+    }
 }
 
 fn ior_of(kind: &MaterialKind) -> f64 {
@@ -274,6 +316,7 @@ impl ReferenceRenderer {
 #[derive(Clone, Debug, Default)]
 struct PixelState {
     sums: PixelSums,
+    aovs: AovSums,
     batch: DVec3,
     in_batch: u64,
     batches: f64,
@@ -290,6 +333,7 @@ impl PixelState {
         }
         if path.radiance.is_finite() {
             self.batch += path.radiance;
+            self.aovs.add(&path.aovs);
         } else {
             self.tally.non_finite += 1;
             let place = NonFinite {
@@ -372,6 +416,7 @@ impl Renderer for ReferenceRenderer {
                 break;
             }
         }
+        let asked = self.settings.classes || self.settings.features;
         let mut tally = Tally::default();
         for pixel in &mut state {
             pixel.end_batch(false);
@@ -381,6 +426,7 @@ impl Renderer for ReferenceRenderer {
             rect: crop,
             samples: samples.start..start,
             batch: self.settings.sampler.batch(samples.start),
+            aovs: state.iter().filter(|_| asked).map(|s| s.aovs).collect(),
             pixels: state.into_iter().map(|s| s.sums).collect(),
             tally,
         })

@@ -29,6 +29,7 @@ sources![
     "bsdf/dielectric",
     "bsdf/reflective",
     "bsdf/evaluate",
+    "bsdf/event",
     "light/environment",
     "light/projected",
     "light/sphere",

@@ -3,6 +3,7 @@
 pub mod dielectric;
 pub mod diffuse;
 pub mod evaluate;
+pub mod event;
 pub mod mirror;
 pub mod reflective;
 pub mod sample;

@@ -1,0 +1,264 @@
+//! Layers beside the image: light by the kind of its path, and what is seen first.
+
+mod cli_support;
+mod common;
+
+use cli_support::{Folder, holds};
+use common::{render_cpu, render_gpu, scene, scene_file, settings};
+use gpu_trace::aov::LightClass;
+use gpu_trace::film::Film;
+use gpu_trace::scene::Scene;
+use gpu_trace::settings::{Integrator, Settings};
+
+const INTEGRATORS: [Integrator; 4] = [
+    Integrator::Path,
+    Integrator::Bsdf,
+    Integrator::Nee,
+    Integrator::Lecture { termination: 0.2 },
+];
+
+fn with_aovs(scene: &Scene, integrator: Integrator, spp: u64) -> Settings {
+    Settings {
+        integrator,
+        roulette: !matches!(integrator, Integrator::Lecture { .. }),
+        classes: true,
+        features: true,
+        ..settings(scene, 24, 18, spp)
+    }
+}
+
+/// The mean light of each class over the image, and its standard error as the spread over pixels of two
+/// halves of the samples would have it; here from renders with several seeds.
+fn class_means(scene: &Scene, integrator: Integrator, seeds: u64) -> Vec<(f64, f64)> {
+    let films: Vec<Film> = (0..seeds)
+        .map(|seed| {
+            let settings = Settings {
+                seed,
+                ..with_aovs(scene, integrator, 256)
+            };
+            render_gpu(scene, &settings)
+        })
+        .collect();
+    (0..5)
+        .map(|class| {
+            let mean = |film: &Film| {
+                let sum = |i| {
+                    film.aovs(i)
+                        .map_or(0.0, |a| a.classes[class].iter().sum::<f64>())
+                };
+                (0..film.rect().pixels()).map(sum).sum::<f64>() / 256.0
+            };
+            let means: Vec<f64> = films.iter().map(mean).collect();
+            gpu_trace::statistics::mean_and_error(&means)
+        })
+        .collect()
+}
+
+#[test]
+fn the_classes_add_up_to_the_image() {
+    for file in ["glass", "lecture-reflective", "tests/lamps", "tests/nested"] {
+        let scene = scene_file(format!("scenes/{file}.toml"));
+        for integrator in INTEGRATORS {
+            let settings = with_aovs(&scene, integrator, 300);
+            for film in [render_gpu(&scene, &settings), render_cpu(&scene, &settings)] {
+                for i in 0..film.rect().pixels() {
+                    let sums = film.aovs(i).expect("asked for");
+                    for (c, mean) in film.mean(i).into_iter().enumerate() {
+                        let sum: f64 = sums.classes.iter().map(|class| class[c]).sum();
+                        // Plain sums of at most 256 numbers in f32.
+                        let limit = 256.0 * common::ULP * mean;
+                        assert!(
+                            (sum / 300.0 - mean).abs() <= limit,
+                            "{file}, {}, pixel {i}: {} and {mean}",
+                            integrator.name(),
+                            sum / 300.0
+                        );
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn the_image_is_the_same_with_and_without() {
+    let scene = scene_file("scenes/glass.toml");
+    let with = with_aovs(&scene, Integrator::Path, 64);
+    let without = Settings {
+        classes: false,
+        features: false,
+        ..with.clone()
+    };
+    let (with, without) = (render_gpu(&scene, &with), render_gpu(&scene, &without));
+    assert_eq!(with.pixels(), without.pixels());
+    assert!(with.aovs(0).is_some() && without.aovs(0).is_none());
+}
+
+#[test]
+fn every_estimator_has_the_same_classes() {
+    let scene = scene_file("scenes/tests/lamps.toml");
+    let reference = class_means(&scene, Integrator::Bsdf, 16);
+    // A scene in which all kinds of paths matter.
+    assert!(
+        reference.iter().all(|(mean, _)| *mean > 0.0),
+        "{reference:?}"
+    );
+    for integrator in [Integrator::Path, Integrator::Nee] {
+        let means = class_means(&scene, integrator, 16);
+        for (class, (a, b)) in means.iter().zip(&reference).enumerate() {
+            let z = (a.0 - b.0) / a.1.hypot(b.1).max(1.0e-9 * b.0);
+            // Ten comparisons with 30 degrees of freedom: a level of 1e-3 for all.
+            assert!(
+                z.abs() < 4.5,
+                "{}, class {class}: {a:?}, {b:?}",
+                integrator.name()
+            );
+        }
+        // Companion: 5 % of the direct light counted as indirect would be found.
+        let (direct, indirect) = (
+            means[LightClass::Direct as usize],
+            means[LightClass::Indirect as usize],
+        );
+        let z = 0.05 * direct.0 / indirect.1.hypot(reference[LightClass::Indirect as usize].1);
+        assert!(z > 4.5, "{direct:?}, {indirect:?}");
+    }
+}
+
+#[test]
+fn classes_are_what_their_names_say() {
+    let class_sums = |film: &Film| {
+        let mut sums = [0.0; 5];
+        for i in 0..film.rect().pixels() {
+            let classes = film.aovs(i).expect("asked for").classes;
+            (0..5).for_each(|k| sums[k] += classes[k].iter().sum::<f64>());
+        }
+        sums
+    };
+    let scene = scene_file("scenes/tests/lamps.toml");
+    for integrator in INTEGRATORS {
+        let limited = |max_bounces| {
+            let settings = Settings {
+                max_bounces,
+                ..with_aovs(&scene, integrator, 64)
+            };
+            class_sums(&render_gpu(&scene, &settings))
+        };
+        // Without an event there is only what is seen itself; one makes it direct, or specular in mirrors.
+        let [emission, direct, indirect, specular, caustic] = limited(0);
+        assert!(emission > 0.0 && direct + indirect + specular + caustic == 0.0);
+        let [_, direct, indirect, _, caustic] = limited(1);
+        assert!(direct > 0.0 && indirect + caustic == 0.0);
+        let [_, _, indirect, specular, caustic] = limited(4);
+        assert!(indirect > 0.0 && specular > 0.0 && caustic > 0.0);
+    }
+    // Of diffuse surfaces alone there are three classes.
+    let lecture = scene_file("scenes/lecture.toml");
+    let film = render_gpu(&lecture, &with_aovs(&lecture, Integrator::Path, 64));
+    let [emission, direct, indirect, specular, caustic] = class_sums(&film);
+    assert!(emission > 0.0 && direct > 0.0 && indirect > 0.0 && specular + caustic == 0.0);
+}
+
+#[test]
+fn what_is_seen_first_is_where_it_is() {
+    // A ball straight ahead and nothing else, near or far, moved or not.
+    for (distance, radius, shift) in [
+        (3.0, 1.0, 0.0),
+        (3.0e4, 1.0e4, 1.0e6),
+        (1.0e-3, 2.0e-4, 0.0),
+    ] {
+        let scene = scene(&format!(
+            "[camera]\nposition = [{shift}, 0, 0]\nlook_at = [{shift}, 0, 1]\nfov = 0.5\n[image]\n\
+             width = 4\nheight = 4\n[environment]\nradiance = [1, 1, 1]\n[material.ball]\n\
+             type = \"diffuse\"\nalbedo = [0.25, 0.5, 0.75]\n[[sphere]]\n\
+             center = [{shift}, 0, {distance}]\nradius = {radius}\nmaterial = \"ball\"\n"
+        ));
+        let settings = Settings {
+            width: 4,
+            height: 4,
+            crop: settings(&scene, 4, 4, 16).crop,
+            ..with_aovs(&scene, Integrator::Path, 16)
+        };
+        for film in [render_gpu(&scene, &settings), render_cpu(&scene, &settings)] {
+            for i in 0..16 {
+                let sums = film.aovs(i).expect("asked for");
+                assert_eq!((sums.hits, sums.albedo), (16.0, [4.0, 8.0, 12.0]));
+                // Within a quarter of a degree of the axis the ball is flat to 1e-4 of its size.
+                let depth = sums.depth / 16.0;
+                let near = (depth / (distance - radius) - 1.0).abs();
+                assert!(near < 1.0e-4 * distance / radius, "{depth}");
+                assert!(
+                    (sums.normal[2] / 16.0 + 1.0).abs() < 1.0e-3,
+                    "{:?}",
+                    sums.normal
+                );
+            }
+        }
+    }
+    let empty = scene_file("scenes/tests/empty.toml");
+    let film = render_gpu(&empty, &with_aovs(&empty, Integrator::Path, 16));
+    assert_eq!(film.aovs(0).map(|a| a.hits), Some(0.0));
+}
+
+#[test]
+fn both_renderers_have_the_same_layers() {
+    let scene = scene_file("scenes/tests/lamps.toml");
+    for adaptive in [false, true] {
+        let settings = Settings {
+            adaptive,
+            ..with_aovs(&scene, Integrator::Path, 256)
+        };
+        let (gpu, cpu) = (render_gpu(&scene, &settings), render_cpu(&scene, &settings));
+        let mut apart = 0;
+        for i in 0..gpu.rect().pixels() {
+            let (a, b) = (
+                gpu.aovs(i).expect("asked for"),
+                cpu.aovs(i).expect("asked for"),
+            );
+            let near = |a: f64, b: f64| (a - b).abs() <= 1.0e-3 * (a.abs() + b.abs() + 1.0e-2);
+            let numbers = |s: &gpu_trace::aov::AovSums| {
+                let mut all = s.classes.as_flattened().to_vec();
+                all.extend(
+                    s.normal
+                        .into_iter()
+                        .chain(s.albedo)
+                        .chain([s.depth, s.hits]),
+                );
+                all
+            };
+            apart += numbers(a)
+                .into_iter()
+                .zip(numbers(b))
+                .filter(|(a, b)| !near(*a, *b))
+                .count();
+        }
+        // A few paths go other ways in f32: of each pixel's 23 numbers hardly one.
+        assert!(apart < gpu.rect().pixels() * 23 / 50, "{apart}");
+    }
+}
+
+#[test]
+fn files_have_the_layers_that_were_asked_for() {
+    let folder = Folder::with_scene();
+    folder.ok(
+        "good.toml --size 16x12 --spp 64 -o a.exr --aov emission,direct,indirect,specular,caustic,\
+         normal,albedo,depth,samples,stderr",
+    );
+    let bytes = folder.read("a.exr");
+    let text = String::from_utf8_lossy(&bytes);
+    holds(
+        &text,
+        &[
+            "direct.R",
+            "caustic.B",
+            "normal.X",
+            "depth.Z",
+            "albedo.G",
+            "samples.N",
+        ],
+    );
+    let run = folder.run("good.toml --aov normal -o a.png");
+    assert_eq!(run.code, Some(2));
+    holds(&run.stderr, &["--aov", ".exr"]);
+    let words = ["good.toml", "--aov", "normals", "-o", "a.exr"];
+    holds(&folder.refused(&words), &["normals", "normal"]);
+}
