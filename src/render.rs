@@ -8,7 +8,7 @@ use crate::error::Result;
 use crate::estimate::Estimate;
 use crate::film::{BLOCK, Film, LEAST_SAMPLES, Window, next_look, window_end};
 use crate::sampler::PILOT;
-use crate::settings::Settings;
+use crate::settings::{Rect, Settings};
 
 /// Renders windows of samples: the GPU or the CPU reference. What comes after does not know which.
 pub trait Renderer {
@@ -34,6 +34,12 @@ pub trait Renderer {
         tiles: Option<&Tiles>,
         control: &mut dyn Control,
     ) -> Result<Window>;
+
+    /// From now on renders only `crop`, which lies in what the renderer was made for.
+    fn show(&mut self, crop: Rect);
+
+    /// Bytes of the device's memory that are allocated for the image and the scene.
+    fn device_bytes(&self) -> u64;
 }
 
 /// Told of progress by a renderer, and asked whether to go on.

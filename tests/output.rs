@@ -723,6 +723,7 @@ fn statistics() -> Stats {
             setup: 0.25,
             compile: 0.25,
             render: 2.0,
+            ledger: 0.0,
         },
         samples: 640 * 480 * 64,
         paths_per_second: f64::NAN,
@@ -737,6 +738,7 @@ fn statistics() -> Stats {
             throughput: f64::INFINITY,
             ..Default::default()
         },
+        ledger: Vec::new(),
         stopped_by: stats::StoppedBy::Interrupt,
         warnings: vec!["a \"quoted\"\nwarning".into()],
     }
@@ -780,6 +782,7 @@ fn statistics_are_valid_json() {
         "roulette",
         "black",
         "bounce_limit",
+        "ledger",
         "geometry",
         "warnings",
     ] {

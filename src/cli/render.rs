@@ -15,6 +15,7 @@ use crate::error::{Error, Result};
 use crate::estimate::{VarianceClass, VarianceReport, energy_cut_at_most, variance_class};
 use crate::film::NonFinite;
 use crate::gpu::device::Gpu;
+use crate::ledger::{self, Entry};
 use crate::output::stats::{BounceLimit, Device, Seconds};
 use crate::output::{
     Aov, Contents, Format, Layer, Picture, Plane, Progress, Snapshot, Stats, Target, atomic,
@@ -79,6 +80,9 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
     let mut watch = Display::new(&progress, &signals, &job);
     let outcome = render_job(renderer.as_mut(), &job, &mut watch);
     progress.finish();
+    let auditing = Instant::now();
+    let ledger = audit(&backend, &job, &outcome, &signals, &mut warnings);
+    let auditing = auditing.elapsed();
 
     warnings.extend(observations(&outcome, &job.settings));
     warnings.extend(no_stderr(args, &outcome));
@@ -104,7 +108,9 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
             setup: setup.as_secs_f64(),
             compile: compile.as_secs_f64(),
             render: outcome.elapsed.as_secs_f64(),
+            ledger: auditing.as_secs_f64(),
         },
+        ledger,
         warnings,
         ..stats
     };
@@ -227,6 +233,29 @@ fn renderer(backend: &Backend, args: &RenderArgs, job: &Job) -> Result<Box<dyn R
     Ok(Box::new(Faulty::new(renderer, device, fault)?))
 }
 
+/// What inexact settings took from the light, unless the render failed or was interrupted. That it cannot
+/// be known is no failure of the render.
+fn audit(
+    backend: &Backend,
+    job: &Job,
+    outcome: &Outcome,
+    signals: &Signals,
+    warnings: &mut Vec<String>,
+) -> Vec<Entry> {
+    if matches!(
+        outcome.stopped_by,
+        StoppedBy::Failure | StoppedBy::Interrupt
+    ) {
+        return Vec::new();
+    }
+    let (scene, settings) = (&job.loaded.scene, &job.settings);
+    let go_on = || signals.code().is_none();
+    ledger::audit(backend, scene, settings, &outcome.film, &go_on).unwrap_or_else(|error| {
+        warnings.push(format!("what inexact settings took is unknown: {error}"));
+        Vec::new()
+    })
+}
+
 /// Spheres of the scene that are not rendered, though nothing is wrong with them.
 fn left_out(placement: &Placement) -> Option<String> {
     let [gone, other] = placement.coincident.first()?.map(|i| i + 1);
@@ -321,6 +350,7 @@ fn statistics(job: &Job, outcome: &Outcome, backend: &str, device: Device) -> St
             throughput: tally.cut_throughput,
             energy_at_most: energy_cut_at_most(&loaded.scene, film),
         },
+        ledger: Vec::new(),
         stopped_by: outcome.stopped_by,
         warnings: Vec::new(),
     }
@@ -386,15 +416,12 @@ fn summary(job: &Job, stats: &Stats) -> String {
     } else {
         String::new()
     };
-    let limit = &stats.bounce_limit;
-    let cut = match (limit.paths, limit.energy_at_most) {
-        (0, _) => String::new(),
-        (_, Some(energy)) => format!(
-            ", bounce limit took at most {} of the light",
-            percent(energy)
-        ),
-        (paths, None) => format!(", bounce limit cut {paths} paths"),
+    let cut = match stats.bounce_limit.paths {
+        0 => String::new(),
+        _ if stats.ledger.iter().any(|e| e.setting == "max-bounces") => String::new(),
+        paths => format!(", max-bounces cut {paths} paths"),
     };
+    let taken: String = stats.ledger.iter().map(taken).collect();
     let lost = stats.first_non_finite.map_or_else(String::new, |first| {
         format!(
             ", {} samples not finite ({})",
@@ -403,7 +430,7 @@ fn summary(job: &Job, stats: &Stats) -> String {
         )
     });
     format!(
-        "{}: {}x{}, {} spp{range}{stopped}, {error}{cut}{lost}, {:.2} s, {} Mpaths/s on {}\n",
+        "{}: {}x{}, {} spp{range}{stopped}, {error}{cut}{taken}{lost}, {:.2} s, {} Mpaths/s on {}\n",
         job.files(),
         stats.width,
         stats.height,
@@ -411,6 +438,28 @@ fn summary(job: &Job, stats: &Stats) -> String {
         stats.seconds.total,
         significant(stats.paths_per_second * 1.0e-6),
         stats.device.name,
+    )
+}
+
+/// What the summary says of a setting that is not exact.
+fn taken(entry: &Entry) -> String {
+    let Entry { setting, value, .. } = entry;
+    let (removed, error) = (entry.removed, entry.standard_error);
+    if !removed.is_finite() {
+        return format!(", what {setting} {value} took is unknown");
+    }
+    if removed.abs() <= 2.0 * error {
+        let most = percent(removed.abs() + 2.0 * error);
+        return format!(", {setting} {value} took less than {most} of the light");
+    }
+    let verb = if removed > 0.0 { "took" } else { "added" };
+    let spread = match error < 0.01 * removed.abs() {
+        true => String::new(),
+        false => format!(" ± {}", percent(error)),
+    };
+    format!(
+        ", {setting} {value} {verb} {}{spread} of the light",
+        percent(removed.abs())
     )
 }
 

@@ -9,6 +9,7 @@ use super::{Metadata, atomic};
 use crate::error::{Error, Result};
 pub use crate::estimate::VarianceClass;
 pub use crate::film::NonFinite;
+pub use crate::ledger::Entry;
 pub use crate::render::StoppedBy;
 
 /// All that is known of a finished render. The names are those of the JSON, which users' scripts
@@ -75,6 +76,8 @@ pub struct Stats {
     pub first_non_finite: Option<NonFinite>,
     /// What the limit on bounces cut off.
     pub bounce_limit: BounceLimit,
+    /// How much light each setting that is not exact took; empty if all are, or were without effect.
+    pub ledger: Vec<Entry>,
     /// What ended the render.
     pub stopped_by: StoppedBy,
     /// What the user was warned of, in order.
@@ -103,6 +106,8 @@ pub struct Seconds {
     pub compile: f64,
     /// Tracing paths.
     pub render: f64,
+    /// Measuring what inexact settings took.
+    pub ledger: f64,
 }
 
 /// Paths that the limit on bounces ended while they could still have found light.
