@@ -18,7 +18,14 @@ pub struct Estimate {
     /// the pixel's mean m and standard error s and the image's mean M. A fraction. `None` while
     /// there are fewer than 16 batches of samples, and for a black image.
     pub error: Option<f64>,
+    /// What the error is at most, with a confidence of 95 %, as far as its spread over the pixels tells;
+    /// known where it is. Little more than the error itself, unless a few pixels have most of it: then
+    /// others may be as bad, and have not met what makes them so.
+    pub error_at_most: Option<f64>,
 }
+
+/// What a standard normal deviate exceeds in 5 % of all cases.
+const UPPER: f64 = 1.6449;
 
 impl Estimate {
     /// The estimate of a film.
@@ -28,17 +35,31 @@ impl Estimate {
         let values = (count * 3) as f64;
         let mean = (0..count).flat_map(|i| film.mean(i)).sum::<f64>() / values;
         let floor = (0.1 * mean).powi(2);
-        let mut sum = Some(0.0);
+        let squared = |i: usize| {
+            let (m, v) = (film.mean(i), film.variance_of_mean(i)?);
+            Some((0..3).map(|c| v[c] / (m[c] * m[c] + floor)).sum::<f64>() / 3.0)
+        };
+        let mut sums = Some([0.0; 2]);
         for i in 0..count {
-            sum = sum.zip(film.variance_of_mean(i)).map(|(sum, v)| {
-                let m = film.mean(i);
-                sum + (0..3).map(|c| v[c] / (m[c] * m[c] + floor)).sum::<f64>()
-            });
+            sums = sums
+                .zip(squared(i))
+                .map(|([sum, squares], e)| [sum + e, squares + e * e]);
         }
-        let error = sum
-            .map(|sum| (sum / values).sqrt())
-            .filter(|e| e.is_finite() && floor > 0.0);
-        Self { mean, error }
+        let known = |e: &f64| e.is_finite() && floor > 0.0;
+        let pixels = count as f64;
+        let error = sums.map(|[sum, _]| (sum / pixels).sqrt()).filter(known);
+        let error_at_most = sums
+            .map(|[sum, squares]| {
+                let mean = sum / pixels;
+                let variance = (squares / pixels - mean * mean).max(0.0) / pixels;
+                (mean + UPPER * variance.sqrt()).sqrt()
+            })
+            .filter(known);
+        Self {
+            mean,
+            error,
+            error_at_most,
+        }
     }
 
     /// Whether nothing has been seen but black.

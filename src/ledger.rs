@@ -126,6 +126,7 @@ fn sample(
     let start = settings.samples.start;
     let settings = Settings {
         samples: start..start.saturating_add(spp).min(settings.samples.end),
+        adaptive: false,
         error: None,
         time: None,
         ..settings.clone()

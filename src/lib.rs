@@ -15,8 +15,9 @@
 //!    trace the same paths. [`backend`]: one of them, opened.
 //! 8. [`render`]: the loop that asks a renderer for windows of samples until a stop rule holds.
 //! 9. [`film`]: f64 sums and variances over all windows. [`aov`]: what it can hold beside the image.
-//! 10. [`estimate`] and [`allocation`]: mean and error; where further samples go. [`forecast`]: what an
-//!     error will cost, from a pilot. [`ledger`]: how much light inexact settings took.
+//! 10. [`estimate`], [`intervals`] and [`allocation`]: mean and error; where further samples go.
+//!     [`forecast`]: what an error will cost, from a pilot. [`ledger`]: how much light inexact settings
+//!     took.
 //! 11. [`output`]: images, statistics, progress.
 //! 12. [`input`] and [`compare`](mod@compare): images of any origin, and how far two are apart.
 //!

@@ -198,12 +198,12 @@ impl Run<'_> {
                 }
             }
             start = end;
-            let error = Estimate::of(film).error;
-            self.control.status.error = error;
+            let estimate = Estimate::of(film);
+            self.control.status.error = estimate.error;
             // At sample counts that nothing seen so far decides.
             if film.samples() >= look {
                 look = next_look(film.samples());
-                let reached = |limit| error.is_some_and(|e| e <= limit);
+                let reached = |limit| estimate.error_at_most.is_some_and(|e| e <= limit);
                 if self.settings.error.is_some_and(reached) {
                     return StoppedBy::Error;
                 }

@@ -298,7 +298,7 @@ fn nothing_is_too_dark() {
             samples,
             ..settings.clone()
         };
-        // Stopped by the error of the image: 300 to 1300 samples.
+        // Stopped by the error of the image, after very different numbers of samples.
         let film = run(
             &mut renderer,
             &Settings {
@@ -306,7 +306,7 @@ fn nothing_is_too_dark() {
                 ..part(0..1 << 14)
             },
         );
-        assert!(Estimate::of(&film).error <= Some(0.12));
+        assert!(Estimate::of(&film).error_at_most <= Some(0.12));
         looks.insert(film.samples());
         stopped.push(mean(&film));
         let first = run(&mut renderer, &part(0..64));
@@ -326,7 +326,7 @@ fn nothing_is_too_dark() {
         z("careless", &companion),
     ];
     eprintln!("stopped at {looks:?}");
-    assert!(looks.len() > 1 && looks.first() > Some(&64), "{looks:?}");
+    assert!(looks.len() > 3, "{looks:?}");
     assert!(z[0].abs() < 3.9 && z[1].abs() < 3.9, "{z:?}");
     assert!(z[2] < -3.9, "companion: {z:?}");
 }

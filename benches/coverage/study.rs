@@ -93,7 +93,8 @@ pub(crate) fn runs(
             // As the render loop does it.
             if running && start >= look {
                 look = next_look(start);
-                let reached = Estimate::of(&film).error.is_some_and(|e| e <= limit);
+                let error = Estimate::of(&film).error_at_most;
+                let reached = error.is_some_and(|e| e <= limit);
                 if reached || start == end {
                     running = false;
                     said[samples.len()].push(Said::by(&film));

@@ -40,6 +40,8 @@ const ERRORS: [f64; 5] = [0.05, 0.02, 0.01, 0.005, 0.001];
 #[command(
     mut_arg("output", |a| a.hide(true)),
     mut_arg("stats", |a| a.hide(true)),
+    mut_arg("aov", |a| a.hide(true)),
+    mut_arg("adaptive", |a| a.hide(true)),
     mut_arg("exposure", |a| a.hide(true)),
     mut_arg("dump_wgsl", |a| a.hide(true)),
     mut_arg("allow_non_finite", |a| a.hide(true)),
@@ -87,6 +89,11 @@ struct Quote {
 /// Runs `price`.
 pub(super) fn run(args: &PriceArgs) -> Result<()> {
     let render = &args.render;
+    if render.adaptive {
+        return Err(Error::Usage(
+            "price knows what samples cost that go everywhere alike: leave --adaptive out".into(),
+        ));
+    }
     let loaded = builtin::resolve(render.scene.as_deref())?;
     let settings = render.settings(&loaded.scene)?;
     check_memory(&settings.crop, LEAST_PIXEL_BYTES)?;

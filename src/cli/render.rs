@@ -215,6 +215,7 @@ fn render_job(renderer: &mut dyn Renderer, job: &Job, watch: &mut dyn Watch) -> 
     };
     let mut outcome = render(renderer, &settings, watch);
     outcome.estimate.error = None;
+    outcome.estimate.error_at_most = None;
     outcome
 }
 

@@ -152,13 +152,12 @@ impl Pilot {
 
     /// The first look at the error at or after `spp` samples.
     fn look(&self, spp: u64) -> u64 {
-        let at_window_end =
-            |spp: u64| window_end(self.start + spp - 1, u64::MAX).saturating_sub(self.start);
-        let mut look = at_window_end(next_look(0));
-        while look < spp {
-            look = at_window_end(next_look(look));
+        let mut at = 0;
+        while at < spp {
+            let due = self.start.saturating_add(next_look(at));
+            at = window_end(due - 1, u64::MAX) - self.start;
         }
-        look
+        at
     }
 
     /// Seconds that `spp` samples take.
@@ -224,7 +223,7 @@ mod tests {
     fn a_render_stops_at_the_first_look_that_suffices() {
         let pilot = pilot();
         let looks: Vec<u64> = std::iter::successors(Some(64), |look| Some(pilot.look(look + 1)))
-            .take(12)
+            .take(40)
             .collect();
         assert_eq!(looks[..5], [64, 128, 256, 512, 768]);
         for limit in [0.3, 0.1, 0.05, 0.02, 0.01] {
@@ -256,6 +255,7 @@ mod tests {
             (16, 1),
             (17, 2),
             (64, 2),
+            (128, 3),
             (256, 4),
             (257, 5),
             (769, 7),

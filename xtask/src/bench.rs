@@ -17,13 +17,14 @@ Usage: cargo xtask bench [TABLE...]
              needs LLVM 19, as of Debian's libllvm19, for its compiled variant)
   hazards    how exact the kernel, a plain one and Mitsuba 3 are on scenes that are hard in f32
              (installs as peers does; writes docs/images/hazards.png; takes ten minutes)
+  coverage   how often 95 % intervals hold the truth, over 200 seeds (half an hour)
 
-Without a name: all but peers and hazards. Run it on an idle machine.
+Without a name: all but peers, hazards and coverage. Run it on an idle machine.
 ";
 
 /// Runs the benchmarks named in `tables`.
 pub(crate) fn all(tables: &[String]) -> Result<(), String> {
-    const KNOWN: [&str; 7] = [
+    const KNOWN: [&str; 8] = [
         "naive",
         "unused",
         "geometry",
@@ -31,6 +32,7 @@ pub(crate) fn all(tables: &[String]) -> Result<(), String> {
         "resources",
         "peers",
         "hazards",
+        "coverage",
     ];
     if tables.iter().any(|t| t == "--help" || t == "-h") {
         print!("{USAGE}");
@@ -60,6 +62,11 @@ pub(crate) fn all(tables: &[String]) -> Result<(), String> {
     }
     if tables.iter().any(|t| t == "hazards") {
         hazards()?;
+    }
+    if tables.iter().any(|t| t == "coverage") {
+        run(cargo()
+            .args(["bench", "--bench", "coverage"])
+            .env("NODEVICE_SELECT", "1"))?;
     }
     Ok(())
 }
