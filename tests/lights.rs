@@ -289,7 +289,7 @@ fn what_no_vertex_can_see_is_not_sampled() {
     let ball = Sphere {
         center: scene.spheres[3].center + glam::DVec3::new(0.3, 0.0, 0.0),
         radius: 0.1,
-        ..scene.spheres[1].clone()
+        ..scene.spheres[1]
     };
     scene.spheres.push(ball);
     assert_eq!(sampled(&scene), [3, 4, 5]);
