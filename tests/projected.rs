@@ -113,7 +113,7 @@ fn segments_are_inverted() {
     let inputs: Vec<Row> = (0..100_000)
         .map(|i| {
             let area = match i % 2 {
-                0 => random.range(0.0, 3.14),
+                0 => random.range(0.0, 3.1),
                 _ => random.magnitude(-24.0, 0.0),
             };
             [area as f32, 0.0, 0.0, 0.0]
