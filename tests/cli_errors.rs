@@ -74,6 +74,8 @@ fn options_are_refused_with_their_name_and_the_way_out() {
         --integrator lecture --termination 1 | --termination | as in 0.2
         --integrator lecture --termination -0.1 | --termination | as in 0.2
         --integrator whitted | --integrator | path, bsdf, nee, lecture
+        --light-sampling disc | --light-sampling | projected, cone
+        --integrator bsdf --light-sampling cone | --light-sampling | --integrator bsdf does not
         --sampler random | --sampler | sobol, independent
         --roulette maybe | --roulette | on, off
         --backend tpu | --backend | auto, gpu, cpu

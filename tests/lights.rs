@@ -8,9 +8,11 @@ use std::f64::consts::TAU;
 use common::{ULP, means, probe, render_cpu, render_gpu, scene, settings, to_row, vector};
 use gpu_trace::check::Random;
 use gpu_trace::film::Film;
+use gpu_trace::lights::MOST_WEIGHED;
+use gpu_trace::placement::Placement;
 use gpu_trace::reference::light::sphere::{cone_height, power_weight};
-use gpu_trace::scene::Scene;
-use gpu_trace::settings::{Integrator, Settings};
+use gpu_trace::scene::{Scene, Sphere};
+use gpu_trace::settings::{Integrator, LightSampling, Settings};
 use gpu_trace::statistics::{chi_square, mean_and_error, sidak};
 
 const LIGHTS: [&str; 5] = ["baked", "emission", "lights", "table", "mis"];
@@ -160,20 +162,37 @@ fn apart(a: &Film, b: &Film, scale: f64) -> (f64, f64) {
     ((x - y) / (variance(a) + variance(b)).sqrt(), x / y - 1.0)
 }
 
+/// Integrators with light sampling, and both ways to do it.
+const SAMPLED: [(Integrator, LightSampling); 4] = [
+    (Integrator::Path, LightSampling::Projected),
+    (Integrator::Nee, LightSampling::Projected),
+    (Integrator::Path, LightSampling::Cone),
+    (Integrator::Nee, LightSampling::Cone),
+];
+
+fn sampled(
+    scene: &Scene,
+    (integrator, light_sampling): (Integrator, LightSampling),
+    spp: u64,
+) -> Film {
+    let settings = Settings {
+        integrator,
+        light_sampling,
+        ..settings(scene, 24, 18, spp)
+    };
+    render_gpu(scene, &settings)
+}
+
 #[test]
 fn all_estimators_converge_to_the_same() {
     for material in BALLS {
         let scene = lamps(material);
         let reference = rendered(&scene, Integrator::Bsdf, 1 << 16);
-        for integrator in [Integrator::Path, Integrator::Nee] {
-            let film = rendered(&scene, integrator, 1 << 13);
+        for how in SAMPLED {
+            let film = sampled(&scene, how, 1 << 13);
             let (z, bias) = apart(&film, &reference, 1.0);
-            eprintln!("{}: z = {z:.2}, bias {bias:.2e}", integrator.name());
-            assert!(
-                z.abs() < 3.9,
-                "{}: {z} deviations, {bias:e}",
-                integrator.name()
-            );
+            eprintln!("{how:?}: z = {z:.2}, bias {bias:.2e}");
+            assert!(z.abs() < 3.9, "{how:?}: {z} deviations, {bias:e}");
             // Companion: 4 % too dark. The reference has fireflies: its error is 0.5 %.
             let (z, _) = apart(&film, &reference, 0.96);
             assert!(z.abs() > 3.9, "4 % is not found: {z}");
@@ -181,28 +200,99 @@ fn all_estimators_converge_to_the_same() {
     }
 }
 
+/// Lamps that BSDF sampling finds well: one that nearly touches the floor, one that stands in it, one
+/// that nearly touches a ball, one beyond the horizon of most of it, and `more` in a row.
+fn close_lamps(more: usize) -> Scene {
+    let mut text = String::from(
+        "[camera]\nposition = [0, 2, 6]\nlook_at = [0, 0.6, 0]\nfov = 50.0\n[image]\nwidth = 24\n\
+         height = 18\n[render]\nmax_bounces = 8\n[material.floor]\ntype = \"diffuse\"\n\
+         albedo = [0.6, 0.6, 0.6]\n[material.lamp]\ntype = \"diffuse\"\nalbedo = [0.3, 0.3, 0.3]\n\
+         emission = [1, 0.8, 0.6]\n[material.mirror]\ntype = \"mirror\"\n\
+         reflectance = [0.9, 0.9, 0.9]\n",
+    );
+    let mut sphere = |center: [f64; 3], radius: f64, material: &str| {
+        text += &format!(
+            "[[sphere]]\ncenter = {center:?}\nradius = {radius:?}\nmaterial = \"{material}\"\n"
+        );
+    };
+    sphere([0.0, -10.0, 0.0], 10.0, "floor");
+    sphere([-1.5, 0.6001, 0.0], 0.6, "lamp");
+    sphere([1.5, 0.0, 0.5], 0.5, "lamp");
+    sphere([0.0, 0.7, -0.5], 0.7, "floor");
+    sphere([0.0, 1.901, -0.5], 0.5, "lamp");
+    sphere([4.0, -1.0, -3.0], 2.0, "lamp");
+    sphere([0.6, 0.3, 1.5], 0.3, "mirror");
+    for i in 0..more {
+        sphere([i as f64 - 3.0, 2.5, -2.0], 0.2, "lamp");
+    }
+    scene(&text)
+}
+
+#[test]
+fn lamps_close_by_are_sampled_without_bias() {
+    // More than are weighed at a vertex: they are drawn from the table.
+    for more in [0, MOST_WEIGHED] {
+        let scene = close_lamps(more);
+        let reference = rendered(&scene, Integrator::Bsdf, 1 << 15);
+        for how in SAMPLED {
+            let film = sampled(&scene, how, 1 << 13);
+            let (z, bias) = apart(&film, &reference, 1.0);
+            eprintln!("{how:?}, {more} more: z = {z:.2}, bias {bias:.2e}");
+            assert!(z.abs() < 3.9, "{how:?}, {more}: {z} deviations, {bias:e}");
+            // Companion: 1 % too dark.
+            let (z, _) = apart(&film, &reference, 0.99);
+            assert!(z.abs() > 3.9, "1 % is not found: {z}");
+        }
+    }
+}
+
 #[test]
 fn both_backends_sample_the_same_lights() {
-    for material in BALLS {
-        let scene = lamps(material);
-        for integrator in [Integrator::Path, Integrator::Nee] {
+    for scene in [
+        lamps(BALLS[0]),
+        lamps(BALLS[1]),
+        close_lamps(0),
+        close_lamps(MOST_WEIGHED),
+    ] {
+        for (integrator, light_sampling) in SAMPLED {
             let settings = Settings {
                 integrator,
+                light_sampling,
                 ..settings(&scene, 24, 18, 64)
             };
             let (a, b) = (render_gpu(&scene, &settings), render_cpu(&scene, &settings));
             let (x, y) = (means(&a), means(&b));
             let off = |(x, y): &(&f64, &f64)| (*x - *y).abs() > 1.0e-3 * y.abs();
             let share = x.iter().zip(&y).filter(off).count() as f64 / x.len() as f64;
+            let name = integrator.name();
             assert!(
                 share < 0.03,
-                "{}: {share} of the values differ",
-                integrator.name()
+                "{name}, {light_sampling:?}: {share} of the values differ"
             );
             let rays = a.tally().rays as f64 / b.tally().rays as f64;
             assert!((rays - 1.0).abs() < 1.0e-3, "{rays}");
         }
     }
+}
+
+#[test]
+fn what_no_vertex_can_see_is_not_sampled() {
+    // The lamp in the glass, the third sphere that emits, is hidden by it; with a ball beside it, it is
+    // not from there.
+    let mut scene = lamps(BALLS[0]);
+    let sampled = |scene: &Scene| -> Vec<usize> {
+        let placement = Placement::new(scene, 24, 18);
+        let lights = placement.lights.table.iter();
+        lights.map(|l| placement.spheres[l.sphere].source).collect()
+    };
+    assert_eq!(sampled(&scene), [4, 5]);
+    let ball = Sphere {
+        center: scene.spheres[3].center + glam::DVec3::new(0.3, 0.0, 0.0),
+        radius: 0.1,
+        ..scene.spheres[1]
+    };
+    scene.spheres.push(ball);
+    assert_eq!(sampled(&scene), [3, 4, 5]);
 }
 
 #[test]
