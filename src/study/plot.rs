@@ -35,13 +35,13 @@ pub struct Curve {
     pub band: Vec<(f64, f64, f64)>,
 }
 
-const WIDTH: f64 = 520.0;
-const HEIGHT: f64 = 420.0;
+const WIDTH: f64 = 460.0;
+const HEIGHT: f64 = 400.0;
 const LEFT: f64 = 58.0;
 const TOP: f64 = 58.0;
 const BOTTOM: f64 = 50.0;
 /// Width of a character of a label, on average, and the height of a line.
-const CHARACTER: f64 = 6.9;
+const CHARACTER: f64 = 7.6;
 const LINE: f64 = 15.0;
 
 /// Colours in light and dark surroundings: Okabe and Ito's (2008), which people with any common form of
@@ -75,7 +75,7 @@ pub fn style() -> String {
          @media(prefers-color-scheme:dark){{.plot{{--bg:#14181c;--ink:#e8ecf0;--dim:#a3adb8;\
          --grid:#39424b;--fine:#232a31;{dark}}}}}{classes}\
          .plot .bg{{fill:var(--bg)}}.plot text{{fill:var(--ink)}}\
-         .plot .title{{font-size:15px;font-weight:600}}.plot .dim{{fill:var(--dim);font-size:12px}}\
+         .plot .title{{font-size:15px;font-weight:600}}.plot .dim{{fill:var(--dim)}}\
          .plot .grid{{stroke:var(--grid)}}.plot .fine{{stroke:var(--fine)}}\
          .plot .frame{{fill:none;stroke:var(--dim)}}\
          .plot .guide{{stroke:var(--dim);stroke-dasharray:2 4}}\

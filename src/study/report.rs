@@ -75,6 +75,7 @@ th:first-child{text-align:left;position:sticky;left:0;background:var(--card)}
 tbody th{font-weight:500}
 .shots{display:grid;grid-template-columns:repeat(auto-fill,minmax(150px,1fr));gap:14px}
 .shots.wide{grid-template-columns:repeat(auto-fill,minmax(min(100%,300px),1fr))}
+@media(max-width:520px){.plots{margin:0 -12px}}
 figure{margin:0}
 .pair{display:grid;grid-auto-flow:column;grid-auto-columns:1fr;gap:4px}
 figure img{display:block;width:100%;height:auto;image-rendering:pixelated;border-radius:4px}

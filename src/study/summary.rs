@@ -93,7 +93,7 @@ pub fn lead(outcome: &Outcome) -> String {
             )
         }
         [(error, best)] => format!(
-            "After {after} only {} has an error that is known: {}.",
+            "After {after} only {} has come to an error yet: {}.",
             best.label,
             percent(*error)
         ),
