@@ -37,7 +37,7 @@ impl Interval {
         }
         let mut random = Random::new("bootstrap");
         let mut resample = || {
-            let word = |_| (u64::from(random.words()[0]) * count as u64 >> 32) as usize;
+            let word = |_| ((u64::from(random.words()[0]) * count as u64) >> 32) as usize;
             (0..count).map(word).collect::<Vec<_>>()
         };
         let mut values: Vec<f64> = (0..RESAMPLES)

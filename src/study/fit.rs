@@ -81,7 +81,7 @@ pub fn bias_fit(sampler: Sampler, points: &[(u64, f64)], scale: &[f64]) -> Optio
 
 /// Whether the samples up to `n` are whole scrambles.
 fn whole(sampler: Sampler, n: u64) -> bool {
-    sampler == Sampler::Independent || n > 0 && n % sampler.batch(n - 1) == 0
+    sampler == Sampler::Independent || n > 0 && n.is_multiple_of(sampler.batch(n - 1))
 }
 
 /// How many of the samples up to `n` are in scrambles of `length`; all samples are independent ones

@@ -2,6 +2,8 @@
 
 use std::fmt::Write as _;
 
+use super::ticks::{decades, doublings, plain};
+
 /// A plot.
 #[derive(Clone, Debug)]
 pub struct Plot {
@@ -367,48 +369,6 @@ fn padded([low, high]: [f64; 2], factor: f64) -> [f64; 2] {
     [low / factor, high * factor]
 }
 
-struct Tick {
-    at: f64,
-    major: bool,
-    labelled: bool,
-}
-
-/// Ticks at 1 to 9 times powers of ten; over little more than a decade, 2 and 5 have numbers too.
-fn decades([low, high]: [f64; 2]) -> Vec<Tick> {
-    let few = high / low < 150.0;
-    let powers = low.log10().floor() as i32..=high.log10().ceil() as i32;
-    let ticks = powers.flat_map(|power| {
-        (1..10).map(move |digit| Tick {
-            at: f64::from(digit) * 10f64.powi(power),
-            major: digit == 1,
-            labelled: digit == 1 || few && (digit == 2 || digit == 5),
-        })
-    });
-    ticks.filter(|t| (low..=high).contains(&t.at)).collect()
-}
-
-/// Ticks at powers of two; over many of them, those of 4 or 16 have numbers.
-fn doublings([low, high]: [f64; 2]) -> Vec<Tick> {
-    let step = match (high / low).log2() {
-        n if n < 7.0 => 1,
-        n if n < 14.0 => 2,
-        _ => 4,
-    };
-    let powers = low.log2().ceil() as i32..=high.log2().floor() as i32;
-    let tick = |power: i32| Tick {
-        at: 2f64.powi(power),
-        major: power % step == 0,
-        labelled: power % step == 0,
-    };
-    powers.map(tick).collect()
-}
-
-/// A number of a tick, which has one digit or is a whole power of two.
-fn plain(value: f64) -> String {
-    let decimals = (-(value * 1.000_001).log10().floor()).max(0.0) as usize;
-    format!("{value:.decimals$}")
-}
-
 /// Text as HTML and SVG take it.
 #[must_use]
 pub fn escape(text: &str) -> String {
@@ -488,23 +448,6 @@ mod tests {
         );
         // The name space is the one address; nothing is fetched.
         assert_eq!(svg.matches("http").count(), 1);
-    }
-
-    #[test]
-    fn ticks_have_short_numbers() {
-        for (value, text) in [
-            (0.01, "0.01"),
-            (0.5, "0.5"),
-            (1.0, "1"),
-            (1024.0, "1024"),
-            (0.1 * 100.0, "10"),
-        ] {
-            assert_eq!(plain(value), text);
-        }
-        let labelled = |ticks: Vec<Tick>| ticks.iter().filter(|t| t.labelled).count();
-        assert_eq!(labelled(decades([0.9, 11.0])), 4);
-        assert_eq!(labelled(decades([0.01, 1000.0])), 6);
-        assert_eq!(labelled(doublings([1.0, 1024.0])), 6);
     }
 
     #[test]

@@ -115,7 +115,7 @@ impl Series {
         }
     }
 
-    /// What tells series apart, in the order of labels.
+    /// What tells series apart, in the order of labels; the usual offset needs no word.
     fn parts(&self) -> [String; 5] {
         [
             self.integrator.name().into(),
@@ -124,8 +124,16 @@ impl Series {
                 BackendKind::Gpu => "GPU f32".into(),
                 BackendKind::Cpu => "CPU f64".into(),
             },
-            self.offset.to_string(),
-            format!("{} bounces", self.max_bounces),
+            match self.offset {
+                Offset::Exact => String::new(),
+                Offset::Back(x) => format!("back:{x:e}"),
+                Offset::Out(x) => format!("out:{x:e}"),
+                other => other.to_string(),
+            },
+            match self.max_bounces {
+                1 => "1 bounce".into(),
+                n => format!("{n} bounces"),
+            },
         ]
     }
 }
@@ -140,8 +148,12 @@ pub fn labels(series: &[Series]) -> Vec<String> {
         shown = vec![0, 1];
     }
     let label = |p: &[String; 5]| {
-        let words: Vec<&str> = shown.iter().map(|i| p[*i].as_str()).collect();
-        words.join(" · ")
+        let words = shown.iter().map(|i| p[*i].as_str());
+        let words: Vec<&str> = words.filter(|word| !word.is_empty()).collect();
+        match words.is_empty() {
+            true => "exact".to_owned(),
+            false => words.join(" · "),
+        }
     };
     parts.iter().map(label).collect()
 }
@@ -202,6 +214,14 @@ mod tests {
             ]
         );
         assert_eq!(labels(&all()[..1]), ["bsdf · sobol"]);
+        let offsets =
+            [Offset::Exact, Offset::Out(1.0e-4)].map(|offset| Series { offset, ..all()[0] });
+        assert_eq!(labels(&offsets), ["exact", "out:1e-4"]);
+        let cpu = all()[1];
+        assert_eq!(
+            labels(&[offsets[1], cpu]),
+            ["GPU f32 · out:1e-4", "CPU f64"]
+        );
     }
 
     #[test]

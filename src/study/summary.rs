@@ -217,6 +217,11 @@ pub fn notices(outcome: &Outcome) -> Vec<String> {
                 .to_owned(),
         );
     }
+    if outcome.complete && outcome.equal_time.is_empty() {
+        said.push(
+            "The images at equal time are not there: the same command renders them.".to_owned(),
+        );
+    }
     if outcome.noise.is_none() {
         said.push(
             "The reference's own noise is unknown (its file has no standard errors): it is in all errors, \

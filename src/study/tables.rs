@@ -1,7 +1,8 @@
 //! The figures as tables of text, for the report and the terminal.
 
-use super::analysis::{Analysis, EqualError, EqualTime, Summary};
+use super::analysis::{Analysis, Summary};
 use super::bootstrap::Interval;
+use super::equal::{EqualError, EqualTime};
 use super::pictures::Pair;
 use crate::estimate::VarianceClass;
 use crate::output::numbers::{percent, significant};
@@ -88,7 +89,10 @@ fn row(s: &Summary) -> Vec<String> {
         spread,
         last.map_or(UNKNOWN.into(), |l| seconds(l.seconds)),
         seconds(s.setup),
-        seconds(s.compile),
+        match s.compile {
+            0.0 => UNKNOWN.into(),
+            time => seconds(time),
+        },
     ]
 }
 
@@ -316,10 +320,13 @@ fn signed(fraction: f64) -> String {
     format!("{sign}{}", percent(fraction.abs()))
 }
 
-/// Seconds with three digits.
+/// A time in seconds with three digits, in milliseconds if it is short.
 #[must_use]
 pub fn seconds(time: f64) -> String {
-    format!("{} s", significant(time))
+    match time {
+        t if t < 0.1 => format!("{} ms", significant(1000.0 * t)),
+        t => format!("{} s", significant(t)),
+    }
 }
 
 /// A round percentage without trailing zeros.
