@@ -37,13 +37,15 @@ pub struct Curve {
     pub band: Vec<(f64, f64, f64)>,
 }
 
-const WIDTH: f64 = 460.0;
+/// Width of a file, and of a plot in a page: there the text must be readable on a phone.
+const WIDE: f64 = 640.0;
+const NARROW: f64 = 460.0;
 const HEIGHT: f64 = 400.0;
 const LEFT: f64 = 58.0;
 const TOP: f64 = 58.0;
 const BOTTOM: f64 = 50.0;
 /// Width of a character of a label, on average, and the height of a line.
-const CHARACTER: f64 = 7.6;
+const CHARACTER: f64 = 7.0;
 const LINE: f64 = 15.0;
 
 /// Colours in light and dark surroundings: Okabe and Ito's (2008), which people with any common form of
@@ -86,7 +88,7 @@ pub fn style() -> String {
          .plot .more{{stroke-dasharray:7 3}}\
          .plot .mark{{fill:var(--c);stroke:var(--bg);stroke-width:.75}}\
          .plot .leader{{stroke:var(--c);opacity:.5}}\
-         .plot .label{{fill:var(--c);font-weight:600;paint-order:stroke;stroke:var(--bg);stroke-width:4;\
+         .plot .label{{fill:var(--c);paint-order:stroke;stroke:var(--bg);stroke-width:4;\
          stroke-linejoin:round}}"
     )
 }
@@ -95,12 +97,14 @@ pub fn style() -> String {
 struct Frame {
     x: [f64; 2],
     y: [f64; 2],
+    /// The plot's, and the room to the right of the curves.
+    width: f64,
     right: f64,
 }
 
 impl Frame {
     fn x(&self, value: f64) -> f64 {
-        LEFT + share(self.x, value) * (WIDTH - LEFT - self.right)
+        LEFT + share(self.x, value) * (self.width - LEFT - self.right)
     }
 
     fn y(&self, value: f64) -> f64 {
@@ -116,10 +120,10 @@ impl Plot {
     /// A file of its own.
     #[must_use]
     pub fn file(&self) -> String {
-        let inside = self.content();
+        let inside = self.content(WIDE);
         format!(
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" class=\"plot\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" \
-             width=\"{WIDTH}\" height=\"{HEIGHT}\" role=\"img\" aria-label=\"{}\"><style>{}</style>{inside}\
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" class=\"plot\" viewBox=\"0 0 {WIDE} {HEIGHT}\" \
+             width=\"{WIDE}\" height=\"{HEIGHT}\" role=\"img\" aria-label=\"{}\"><style>{}</style>{inside}\
              </svg>\n",
             escape(&self.title),
             style()
@@ -130,21 +134,21 @@ impl Plot {
     #[must_use]
     pub fn inline(&self) -> String {
         format!(
-            "<svg class=\"plot\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" aria-label=\"{}\">{}</svg>",
+            "<svg class=\"plot\" viewBox=\"0 0 {NARROW} {HEIGHT}\" role=\"img\" aria-label=\"{}\">{}</svg>",
             escape(&self.title),
-            self.content()
+            self.content(NARROW)
         )
     }
 
-    fn content(&self) -> String {
+    fn content(&self, width: f64) -> String {
         let mut out = format!(
-            "<title>{title}</title><rect class=\"bg\" width=\"{WIDTH}\" height=\"{HEIGHT}\" rx=\"6\"/>\
+            "<title>{title}</title><rect class=\"bg\" width=\"{width}\" height=\"{HEIGHT}\" rx=\"6\"/>\
              <text class=\"title\" x=\"16\" y=\"26\">{title}</text>\
              <text class=\"dim\" x=\"16\" y=\"44\">{}</text>",
             escape(&self.subtitle),
             title = escape(&self.title),
         );
-        let Some(frame) = self.frame() else {
+        let Some(frame) = self.frame(width) else {
             let _ = write!(
                 out,
                 "<text class=\"dim\" x=\"16\" y=\"80\">no error is known yet</text>"
@@ -160,7 +164,7 @@ impl Plot {
         out
     }
 
-    fn frame(&self) -> Option<Frame> {
+    fn frame(&self, whole: f64) -> Option<Frame> {
         let points = || self.curves.iter().flat_map(|c| &c.points);
         let bands = || self.curves.iter().flat_map(|c| &c.band);
         let x = range(points().map(|p| p.0))?;
@@ -170,7 +174,7 @@ impl Plot {
                 .chain(bands().flat_map(|b| [b.1, b.2])),
         )?;
         let (x, y) = (padded(x, 1.25), padded(y, 1.25));
-        let room = WIDTH - LEFT;
+        let room = whole - LEFT;
         let right = self.curves.iter().filter_map(|curve| {
             let end = share(x, curve.points.last()?.0);
             Some(room - (room - 16.0 - width(&curve.label)) / end)
@@ -178,17 +182,18 @@ impl Plot {
         Some(Frame {
             x,
             y,
-            right: right.fold(14.0, f64::max).min(0.45 * WIDTH),
+            width: whole,
+            right: right.fold(14.0, f64::max).min(0.45 * whole),
         })
     }
 
     fn axes(&self, out: &mut String, frame: &Frame) {
-        let (bottom, right) = (HEIGHT - BOTTOM, WIDTH - frame.right);
+        let (bottom, right) = (HEIGHT - BOTTOM, frame.width - frame.right);
         let samples = self.x == Axis::Samples;
         let across = if samples {
             doublings(frame.x)
         } else {
-            decades(frame.x)
+            decades(frame.x, frame.x(10.0) - frame.x(1.0) > 130.0)
         };
         for tick in &across {
             let x = frame.x(tick.at);
@@ -210,7 +215,8 @@ impl Plot {
                 );
             }
         }
-        for tick in decades(frame.y) {
+        let tall = frame.y(1.0) - frame.y(10.0);
+        for tick in decades(frame.y, tall > 60.0) {
             let y = frame.y(tick.at);
             let class = if tick.major { "grid" } else { "fine" };
             let _ = write!(
@@ -433,7 +439,7 @@ mod tests {
         assert!(rows[0] > TOP && rows[8] < HEIGHT - BOTTOM + 5.0, "{rows:?}");
         let ends = places(&svg, "label", "x");
         assert!(
-            ends.iter().zip(names).all(|(x, n)| x + width(n) <= WIDTH),
+            ends.iter().zip(names).all(|(x, n)| x + width(n) <= WIDE),
             "{ends:?}"
         );
     }

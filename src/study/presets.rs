@@ -28,6 +28,8 @@ pub struct Preset {
     pub exact_on_cpu: bool,
     /// What renders the reference.
     pub reference: Option<BackendKind>,
+    /// Its samples a pixel.
+    pub reference_spp: u64,
     /// The longer side of the image, in pixels.
     pub side: u32,
     /// Samples a pixel.
@@ -55,6 +57,7 @@ pub const PRESETS: [Preset; 3] = [
         offsets: &[],
         exact_on_cpu: false,
         reference: Some(BackendKind::Cpu),
+        reference_spp: 4096,
         side: 128,
         spp: 1024,
         seeds: 8,
@@ -77,6 +80,7 @@ pub const PRESETS: [Preset; 3] = [
         ],
         exact_on_cpu: true,
         reference: Some(BackendKind::Cpu),
+        reference_spp: 4096,
         side: 96,
         spp: 1024,
         seeds: 8,
@@ -93,6 +97,7 @@ pub const PRESETS: [Preset; 3] = [
         offsets: &[],
         exact_on_cpu: false,
         reference: None,
+        reference_spp: 8192,
         side: 160,
         spp: 4096,
         seeds: 8,

@@ -229,26 +229,29 @@ pub fn notices(outcome: &Outcome) -> Vec<String> {
                 .to_owned(),
         );
     }
-    for s in &outcome.analysis.series {
-        match s.variance {
-            VarianceClass::Infinite => said.push(format!(
-                "{}: the variance may be infinite. Its errors are medians and quantiles over the runs; a mean \
-                 over runs or a fit of variance would say nothing.",
-                s.label
-            )),
-            VarianceClass::HeavyTailed => said.push(format!(
-                "{}: the samples have a heavy tail; few runs see its rarest values, and intervals may be too \
-                 narrow.",
-                s.label
-            )),
-            VarianceClass::Finite => {}
-        }
-        if s.non_finite > 0 {
-            said.push(format!(
-                "{}: {} samples were no finite number; they are in no sum.",
-                s.label, s.non_finite
-            ));
-        }
+    let of = |class: VarianceClass| {
+        let series = outcome.analysis.series.iter();
+        let labels = series
+            .filter(|s| s.variance == class)
+            .map(|s| s.label.as_str());
+        Some(labels.collect::<Vec<_>>().join(", ")).filter(|text| !text.is_empty())
+    };
+    if let Some(labels) = of(VarianceClass::Infinite) {
+        said.push(format!(
+            "The variance may be infinite: {labels}. These errors are medians and quantiles over the runs; a mean \
+             over runs or a fit of variance would say nothing."
+        ));
+    }
+    if let Some(labels) = of(VarianceClass::HeavyTailed) {
+        said.push(format!(
+            "The samples have a heavy tail: {labels}. Few runs see its rarest values, and intervals may be too narrow."
+        ));
+    }
+    for s in outcome.analysis.series.iter().filter(|s| s.non_finite > 0) {
+        said.push(format!(
+            "{}: {} samples were no finite number; they are in no sum.",
+            s.label, s.non_finite
+        ));
     }
     said
 }

@@ -10,15 +10,14 @@ pub(super) struct Tick {
     pub(super) labelled: bool,
 }
 
-/// Ticks at 1 to 9 times powers of ten; over little more than a decade, 2 and 5 have numbers too.
-pub(super) fn decades([low, high]: [f64; 2]) -> Vec<Tick> {
-    let few = high / low < 150.0;
+/// Ticks at 1 to 9 times powers of ten; where a decade has `room`, 2 and 5 have numbers too.
+pub(super) fn decades([low, high]: [f64; 2], room: bool) -> Vec<Tick> {
     let powers = low.log10().floor() as i32..=high.log10().ceil() as i32;
     let ticks = powers.flat_map(|power| {
         (1..10).map(move |digit| Tick {
             at: f64::from(digit) * 10f64.powi(power),
             major: digit == 1,
-            labelled: digit == 1 || few && (digit == 2 || digit == 5),
+            labelled: digit == 1 || room && (digit == 2 || digit == 5),
         })
     });
     ticks.filter(|t| (low..=high).contains(&t.at)).collect()
@@ -62,8 +61,8 @@ mod tests {
             assert_eq!(plain(value), text);
         }
         let labelled = |ticks: Vec<Tick>| ticks.iter().filter(|t| t.labelled).count();
-        assert_eq!(labelled(decades([0.9, 11.0])), 4);
-        assert_eq!(labelled(decades([0.01, 1000.0])), 6);
+        assert_eq!(labelled(decades([0.9, 11.0], true)), 4);
+        assert_eq!(labelled(decades([0.01, 1000.0], false)), 6);
         assert_eq!(labelled(doublings([1.0, 1024.0])), 6);
     }
 }

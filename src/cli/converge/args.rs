@@ -119,7 +119,7 @@ pub(in crate::cli) struct ConvergeArgs {
     #[arg(long, value_name = "FILE", conflicts_with_all = ["reference_spp", "reference_backend"],
           help_heading = "Reference")]
     pub(super) reference: Option<PathBuf>,
-    /// Samples a pixel of the study's own reference [default: 8 times --spp].
+    /// Samples a pixel of the study's own reference [default: 4 times --spp].
     #[arg(long, value_name = "N", value_parser = values::count, allow_negative_numbers = true,
           help_heading = "Reference")]
     pub(super) reference_spp: Option<u64>,

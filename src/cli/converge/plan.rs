@@ -29,8 +29,9 @@ const SIDE: u32 = 160;
 const SPP: u64 = 1024;
 /// Runs of each series where nobody says.
 const SEEDS: u64 = 8;
-/// The reference's samples are so many times the largest number.
-const LONGER: u64 = 8;
+/// The reference's samples are so many times the largest number: its noise is subtracted, so that more
+/// would change little.
+const LONGER: u64 = 4;
 /// The seed of the study's own reference: no run may have it.
 const REFERENCE_SEED: u64 = u64::MAX;
 
@@ -303,9 +304,11 @@ fn own_reference(
         offset: Offset::Exact,
         max_bounces: base.max_bounces.max(bounces.unwrap_or(0)),
     };
-    let spp = args
-        .reference_spp
-        .unwrap_or(spp.saturating_mul(LONGER).max(SPP));
+    let usual = match preset {
+        Some(preset) if args.spp.is_none() => preset.reference_spp,
+        _ => spp.saturating_mul(LONGER).max(SPP),
+    };
+    let spp = args.reference_spp.unwrap_or(usual);
     let seed = REFERENCE_SEED;
     let identity = ReferenceIdentity::Own {
         backend: backend.name().into(),
