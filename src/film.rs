@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use crate::settings::Rect;
+use crate::statistics::student_quantile;
 
 /// Samples a block: f32 sums run over one block, and every batch, whose spread gives the error
 /// estimate, is some of them. The kernel's `BLOCK`.
@@ -98,6 +99,8 @@ pub struct Film {
     /// Batches, and the samples in them, of windows that have at least two.
     batches: u64,
     covered: u64,
+    /// Of these windows: the samples in their batches squared, over one less than the batches.
+    doubt: f64,
     sum: Vec<[f64; 3]>,
     /// Estimated variance of the covered samples' sum.
     variance: Vec<[f64; 3]>,
@@ -114,6 +117,7 @@ impl Film {
             samples: 0,
             batches: 0,
             covered: 0,
+            doubt: 0.0,
             sum: vec![[0.0; 3]; pixels],
             variance: vec![[0.0; 3]; pixels],
             tally: Tally::default(),
@@ -146,7 +150,9 @@ impl Film {
         self.samples += window.samples.end - window.samples.start;
         if batches > 1 {
             self.batches += batches;
-            self.covered += batches * window.batch;
+            let covered = batches * window.batch;
+            self.covered += covered;
+            self.doubt += (covered as f64).powi(2) / (batches - 1) as f64;
         }
         self.tally.add(&window.tally);
     }
@@ -185,6 +191,24 @@ impl Film {
         }
         let scale = 1.0 / (self.covered as f64 * self.samples as f64);
         Some(self.variance[i].map(|v| v * scale))
+    }
+
+    /// The degrees of freedom of [`variance_of_mean`](Self::variance_of_mean); `None` where that is.
+    ///
+    /// Welch 1947 and Satterthwaite 1946, with one variance a sample throughout. Longer scrambles have
+    /// less, so that the windows with few and long batches weigh less than this has it: it is on the
+    /// cautious side.
+    #[must_use]
+    pub fn freedom(&self) -> Option<f64> {
+        (self.batches >= 16).then(|| (self.covered as f64).powi(2) / self.doubt)
+    }
+
+    /// Half the width of the interval about [`mean`](Self::mean) that holds the truth in 95 % of all
+    /// renders (Student 1908); `None` below 16 batches. `docs/accuracy.md` says how far that is true.
+    #[must_use]
+    pub fn half_width(&self, i: usize) -> Option<[f64; 3]> {
+        let t = student_quantile(self.freedom()?, 0.95);
+        self.variance_of_mean(i).map(|v| v.map(|v| t * v.sqrt()))
     }
 
     /// The means as linear f32, rows from the top.

@@ -15,7 +15,8 @@
 //!    trace the same paths. [`backend`]: one of them, opened.
 //! 8. [`render`]: the loop that asks a renderer for windows of samples until a stop rule holds.
 //! 9. [`film`]: f64 sums and variances over all windows.
-//! 10. [`estimate`]: mean and error.
+//! 10. [`estimate`]: mean and error. [`forecast`]: what an error will cost, from a pilot.
+//!     [`ledger`]: how much light inexact settings took.
 //! 11. [`output`]: images, statistics, progress.
 //! 12. [`input`] and [`compare`](mod@compare): images of any origin, and how far two are apart.
 //!
@@ -32,8 +33,10 @@ pub mod effects;
 pub mod error;
 pub mod estimate;
 pub mod film;
+pub mod forecast;
 pub mod gpu;
 pub mod input;
+pub mod ledger;
 pub mod lights;
 pub mod media;
 pub mod output;

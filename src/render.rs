@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use crate::error::Result;
 use crate::estimate::Estimate;
 use crate::film::{Film, Window, window_end};
-use crate::settings::Settings;
+use crate::settings::{Rect, Settings};
 
 /// Renders windows of samples: the GPU or the CPU reference. What comes after does not know which.
 pub trait Renderer {
@@ -19,6 +19,12 @@ pub trait Renderer {
     /// # Errors
     /// If the device fails. The film keeps what it has.
     fn render(&mut self, samples: Range<u64>, control: &mut dyn Control) -> Result<Window>;
+
+    /// From now on renders only `crop`, which lies in what the renderer was made for.
+    fn show(&mut self, crop: Rect);
+
+    /// Bytes of the device's memory that are allocated for the image and the scene.
+    fn device_bytes(&self) -> u64;
 }
 
 /// Told of progress by a renderer, and asked whether to go on.

@@ -35,4 +35,28 @@ impl Sampler {
             (Self::Sobol, _) => 64,
         }
     }
+
+    /// The sample indices from which on batches have another length than before.
+    #[must_use]
+    pub fn levels(self) -> &'static [u64] {
+        match self {
+            Self::Independent => &[0],
+            Self::Sobol => &[0, 64, 256],
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Sampler;
+
+    #[test]
+    fn batches_change_at_the_levels_only() {
+        for sampler in [Sampler::Independent, Sampler::Sobol] {
+            for index in 1..2000 {
+                let changes = sampler.batch(index) != sampler.batch(index - 1);
+                assert_eq!(changes, sampler.levels()[1..].contains(&index), "{index}");
+            }
+        }
+    }
 }

@@ -1,6 +1,6 @@
 //! Tests of hypotheses, for `check` and for the tests. All p-values are two-sided or upper tails, as each function says.
 
-use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
+use statrs::distribution::{ChiSquared, ContinuousCDF, Normal, StudentsT};
 
 /// The significance of a whole family of tests.
 pub const SIGNIFICANCE: f64 = 1.0e-3;
@@ -22,6 +22,36 @@ pub fn normal_limit(count: usize) -> f64 {
 #[must_use]
 pub fn normal_p(z: f64) -> f64 {
     2.0 * Normal::standard().sf(z.abs())
+}
+
+/// The size that a Student's t of `freedom` degrees of freedom exceeds with a probability of
+/// 1 - `level`.
+///
+/// # Panics
+/// If `freedom` is not positive.
+#[must_use]
+pub fn student_quantile(freedom: f64, level: f64) -> f64 {
+    if freedom.is_infinite() {
+        return Normal::standard().inverse_cdf(0.5 + 0.5 * level);
+    }
+    student(freedom).inverse_cdf(0.5 + 0.5 * level)
+}
+
+/// The size of a normal deviate that is as improbable as |t| with `freedom` degrees of freedom, which
+/// may be infinite.
+///
+/// # Panics
+/// If `freedom` is not positive.
+#[must_use]
+pub fn as_normal(t: f64, freedom: f64) -> f64 {
+    if freedom.is_infinite() {
+        return t.abs();
+    }
+    -Normal::standard().inverse_cdf(student(freedom).sf(t.abs()))
+}
+
+fn student(freedom: f64) -> StudentsT {
+    StudentsT::new(0.0, 1.0, freedom).expect("positive degrees of freedom")
 }
 
 /// What a chi-square test found.

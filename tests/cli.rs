@@ -303,7 +303,11 @@ fn no_bounces_show_the_lamp_alone() {
     let stats = folder.json("r.json");
     assert_eq!(stats["bounce_limit"]["paths"], json!(16 * 16 * 8));
     assert_eq!(stats["rays"], stats["samples"]);
-    assert!(summary.contains("bounce limit"), "{summary}");
+    assert!(summary.contains("max-bounces 0 took "), "{summary}");
+    assert!(
+        stats["ledger"][0]["removed"].as_f64() > Some(0.5),
+        "{stats}"
+    );
 }
 
 #[test]

@@ -721,11 +721,13 @@ fn statistics() -> Stats {
             setup: 0.25,
             compile: 0.25,
             render: 2.0,
+            ledger: 0.0,
         },
         samples: 640 * 480 * 64,
         paths_per_second: f64::NAN,
         rays: 1 << 40,
         estimated_error: None,
+        degrees_of_freedom: None,
         variance: stats::VarianceClass::HeavyTailed,
         black: false,
         non_finite: 0,
@@ -734,6 +736,7 @@ fn statistics() -> Stats {
             throughput: f64::INFINITY,
             ..Default::default()
         },
+        ledger: Vec::new(),
         stopped_by: stats::StoppedBy::Interrupt,
         warnings: vec!["a \"quoted\"\nwarning".into()],
     }
@@ -765,6 +768,7 @@ fn statistics_are_valid_json() {
         "paths_per_second",
         "rays",
         "estimated_error",
+        "degrees_of_freedom",
         "variance",
         "non_finite",
         "first_non_finite",
@@ -774,6 +778,7 @@ fn statistics_are_valid_json() {
         "roulette",
         "black",
         "bounce_limit",
+        "ledger",
         "geometry",
         "warnings",
     ] {

@@ -11,7 +11,7 @@ use super::fault::Fault;
 use super::values;
 use crate::effects::BAKED_MOST;
 use crate::error::{Error, Result};
-use crate::output::ProgressMode;
+use crate::output::{Aov, ProgressMode};
 use crate::sampler::Sampler;
 use crate::scene::{MAX_BOUNCES, Scene};
 use crate::settings::{
@@ -46,6 +46,16 @@ pub struct RenderArgs {
         help = "Write statistics as JSON"
     )]
     pub stats: Option<PathBuf>,
+    #[arg(
+        long,
+        value_name = "LIST",
+        value_enum,
+        value_delimiter = ',',
+        help_heading = "Output",
+        hide_possible_values = true,
+        help = "Layers of EXR files beside the image, as in stderr,samples: stderr (standard errors), samples (how many)"
+    )]
+    pub aov: Vec<Aov>,
     #[arg(
         long, value_name = "EV", value_parser = values::exposure, default_value = "0",
         allow_hyphen_values = true, hide_default_value = true, help_heading = "Output",

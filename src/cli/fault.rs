@@ -8,6 +8,7 @@ use crate::error::{Error, Result};
 use crate::film::{NonFinite, Window};
 use crate::gpu::device::Gpu;
 use crate::render::{Control, Renderer};
+use crate::settings::Rect;
 
 /// What fails, and when.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -106,5 +107,13 @@ impl Renderer for Faulty {
             }));
         }
         Ok(window)
+    }
+
+    fn show(&mut self, crop: Rect) {
+        self.inner.show(crop);
+    }
+
+    fn device_bytes(&self) -> u64 {
+        self.inner.device_bytes()
     }
 }

@@ -9,6 +9,7 @@ mod devices;
 mod effects;
 mod fault;
 mod format;
+mod price;
 mod render;
 mod scene;
 mod shell;
@@ -35,6 +36,7 @@ Examples:
   gpu-trace                                    the built-in lecture scene, to lecture.png
   gpu-trace glass --spp 1024 -o glass.exr      another scene, linear floats
   gpu-trace my.toml --error 1% --time 2m       until the error is 1 % or two minutes are over
+  gpu-trace price my.toml                      what will 1 % cost, in seconds?
   gpu-trace effects my.toml                    what the kernel will hold, and why
   gpu-trace check --quick                      does this adapter stand the hard cases?
   gpu-trace compare a.exr b.exr --tolerance 1% is image a within 1 % of reference b?
@@ -74,6 +76,9 @@ enum Command {
         #[arg(long)]
         json: bool,
     },
+    /// Forecast the samples and seconds that an error will cost, from a short pilot.
+    #[command(after_help = price::AFTER_HELP)]
+    Price(Box<price::PriceArgs>),
     /// Measure the hard numerical cases on this adapter against f64; exit 3 if any fails.
     Check(Box<args::CheckArgs>),
     /// Compare an image with a reference: errors, bias, FLIP, SSIM; exit 3 beyond a tolerance.
@@ -163,6 +168,7 @@ fn run(cli: Cli) -> Result<()> {
         }
         Some(Command::Render(args)) => render::run(&args),
         Some(Command::Effects { render, json }) => effects::run(&render, json),
+        Some(Command::Price(args)) => price::run(&args),
         Some(Command::Check(args)) => check::run(&args),
         Some(Command::Compare(args)) => compare::run(&args),
         Some(Command::Converge(args)) => converge::run(&args),

@@ -15,9 +15,11 @@ use crate::error::{Error, Result};
 use crate::estimate::{VarianceClass, VarianceReport, energy_cut_at_most, variance_class};
 use crate::film::NonFinite;
 use crate::gpu::device::Gpu;
+use crate::ledger::{self, Entry};
 use crate::output::stats::{BounceLimit, Device, Seconds};
 use crate::output::{
-    Contents, Picture, Progress, Snapshot, Stats, Target, atomic, check_all, write_all,
+    Aov, Contents, Format, Layer, Picture, Plane, Progress, Snapshot, Stats, Target, atomic,
+    check_all, write_all,
 };
 use crate::placement::Placement;
 use crate::render::{Outcome, Renderer, Status, StoppedBy, Watch, render};
@@ -78,8 +80,12 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
     let mut watch = Display::new(&progress, &signals, &job);
     let outcome = render_job(renderer.as_mut(), &job, &mut watch);
     progress.finish();
+    let auditing = Instant::now();
+    let ledger = audit(&backend, &job, &outcome, &signals, &mut warnings);
+    let auditing = auditing.elapsed();
 
     warnings.extend(observations(&outcome, &job.settings));
+    warnings.extend(no_stderr(args, &outcome));
     if args.allow_non_finite {
         warnings.extend(not_finite(&outcome));
     }
@@ -102,7 +108,9 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
             setup: setup.as_secs_f64(),
             compile: compile.as_secs_f64(),
             render: outcome.elapsed.as_secs_f64(),
+            ledger: auditing.as_secs_f64(),
         },
+        ledger,
         warnings,
         ..stats
     };
@@ -174,6 +182,11 @@ fn prepare(args: &RenderArgs) -> Result<Job> {
             .map(Target::parse)
             .collect::<Result<_>>()?
     };
+    if !args.aov.is_empty() && !targets.iter().any(|t| t.format == Format::Exr) {
+        return Err(Error::Usage(
+            "--aov: only EXR files have room for layers: add an output such as -o image.exr".into(),
+        ));
+    }
     let mut outputs: Vec<&Path> = targets.iter().map(|t| t.path.as_path()).collect();
     outputs.extend(args.stats.as_deref());
     outputs.extend(args.dump_wgsl.as_deref());
@@ -219,6 +232,29 @@ fn renderer(backend: &Backend, args: &RenderArgs, job: &Job) -> Result<Box<dyn R
     Ok(Box::new(Faulty::new(renderer, device, fault)?))
 }
 
+/// What inexact settings took from the light, unless the render failed or was interrupted. That it cannot
+/// be known is no failure of the render.
+fn audit(
+    backend: &Backend,
+    job: &Job,
+    outcome: &Outcome,
+    signals: &Signals,
+    warnings: &mut Vec<String>,
+) -> Vec<Entry> {
+    if matches!(
+        outcome.stopped_by,
+        StoppedBy::Failure | StoppedBy::Interrupt
+    ) {
+        return Vec::new();
+    }
+    let (scene, settings) = (&job.loaded.scene, &job.settings);
+    let go_on = || signals.code().is_none();
+    ledger::audit(backend, scene, settings, &outcome.film, &go_on).unwrap_or_else(|error| {
+        warnings.push(format!("what inexact settings took is unknown: {error}"));
+        Vec::new()
+    })
+}
+
 /// Spheres of the scene that are not rendered, though nothing is wrong with them.
 fn left_out(placement: &Placement) -> Option<String> {
     let [gone, other] = placement.coincident.first()?.map(|i| i + 1);
@@ -260,6 +296,13 @@ fn observations(outcome: &Outcome, settings: &Settings) -> Vec<String> {
     said
 }
 
+/// What to say where standard errors were asked for and are unknown.
+fn no_stderr(args: &RenderArgs, outcome: &Outcome) -> Option<String> {
+    let asked = args.aov.contains(&Aov::Stderr) && outcome.film.samples() > 0;
+    let unknown = asked && Plane::stderr_unknown(&outcome.film, &outcome.estimate);
+    unknown.then(|| "the standard errors are unknown: the layer stderr holds no numbers".to_owned())
+}
+
 fn statistics(job: &Job, outcome: &Outcome, backend: &str, device: Device) -> Stats {
     let Job {
         loaded,
@@ -293,6 +336,7 @@ fn statistics(job: &Job, outcome: &Outcome, backend: &str, device: Device) -> St
         paths_per_second: samples as f64 / outcome.elapsed.as_secs_f64(),
         rays: tally.rays,
         estimated_error: outcome.estimate.error,
+        degrees_of_freedom: outcome.estimate.error.and_then(|_| film.freedom()),
         variance: job.variance.class,
         black: outcome.estimate.is_black(),
         non_finite: tally.non_finite,
@@ -302,6 +346,7 @@ fn statistics(job: &Job, outcome: &Outcome, backend: &str, device: Device) -> St
             throughput: tally.cut_throughput,
             energy_at_most: energy_cut_at_most(&loaded.scene, film),
         },
+        ledger: Vec::new(),
         stopped_by: outcome.stopped_by,
         warnings: Vec::new(),
     }
@@ -318,9 +363,15 @@ fn finish(args: &RenderArgs, job: &Job, outcome: &Outcome, stats: &Stats) -> Res
     }
     let crop = job.settings.crop;
     let picture = Picture::new(crop.width, crop.height, outcome.film.pixels());
+    let planes: Vec<Plane> = args
+        .aov
+        .iter()
+        .map(|aov| Plane::of(*aov, &outcome.film, &outcome.estimate))
+        .collect();
+    let layers: Vec<Layer<'_>> = planes.iter().map(Plane::layer).collect();
     let contents = Contents {
         picture: &picture,
-        layers: &[],
+        layers: &layers,
         metadata: &stats.metadata(),
         exposure: args.exposure,
     };
@@ -355,15 +406,12 @@ fn summary(job: &Job, stats: &Stats) -> String {
         StoppedBy::Interrupt => ", interrupted",
         StoppedBy::Failure => ", failed",
     };
-    let limit = &stats.bounce_limit;
-    let cut = match (limit.paths, limit.energy_at_most) {
-        (0, _) => String::new(),
-        (_, Some(energy)) => format!(
-            ", bounce limit took at most {} of the light",
-            percent(energy)
-        ),
-        (paths, None) => format!(", bounce limit cut {paths} paths"),
+    let cut = match stats.bounce_limit.paths {
+        0 => String::new(),
+        _ if stats.ledger.iter().any(|e| e.setting == "max-bounces") => String::new(),
+        paths => format!(", max-bounces cut {paths} paths"),
     };
+    let taken: String = stats.ledger.iter().map(taken).collect();
     let lost = stats.first_non_finite.map_or_else(String::new, |first| {
         format!(
             ", {} samples not finite ({})",
@@ -372,7 +420,7 @@ fn summary(job: &Job, stats: &Stats) -> String {
         )
     });
     format!(
-        "{}: {}x{}, {} spp{stopped}, {error}{cut}{lost}, {:.2} s, {} Mpaths/s on {}\n",
+        "{}: {}x{}, {} spp{stopped}, {error}{cut}{taken}{lost}, {:.2} s, {} Mpaths/s on {}\n",
         job.files(),
         stats.width,
         stats.height,
@@ -380,6 +428,28 @@ fn summary(job: &Job, stats: &Stats) -> String {
         stats.seconds.total,
         significant(stats.paths_per_second * 1.0e-6),
         stats.device.name,
+    )
+}
+
+/// What the summary says of a setting that is not exact.
+fn taken(entry: &Entry) -> String {
+    let Entry { setting, value, .. } = entry;
+    let (removed, error) = (entry.removed, entry.standard_error);
+    if !removed.is_finite() {
+        return format!(", what {setting} {value} took is unknown");
+    }
+    if removed.abs() <= 2.0 * error {
+        let most = percent(removed.abs() + 2.0 * error);
+        return format!(", {setting} {value} took less than {most} of the light");
+    }
+    let verb = if removed > 0.0 { "took" } else { "added" };
+    let spread = match error < 0.01 * removed.abs() {
+        true => String::new(),
+        false => format!(" ± {}", percent(error)),
+    };
+    format!(
+        ", {setting} {value} {verb} {}{spread} of the light",
+        percent(removed.abs())
     )
 }
 

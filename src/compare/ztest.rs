@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::is_finite;
 use crate::input::Input;
 use crate::output::Picture;
-use crate::statistics::normal_limit;
+use crate::statistics::{as_normal, normal_limit};
 
 /// What a value can be off by without any noise, relative: rounding in f32 and in the device's
 /// functions. Pixels of constant radiance have no other error.
@@ -21,7 +21,8 @@ pub struct ZTest {
     /// Which of the images have standard errors: `both`, `image` or `reference`; the other is taken
     /// as exact.
     pub known: Known,
-    /// The largest |z| of a value.
+    /// The largest |z| of a value: where a file tells the degrees of freedom of its standard errors,
+    /// the normal deviate that is as improbable as Student's t.
     pub worst: f64,
     /// Where that is: column and row.
     pub worst_at: [u32; 2],
@@ -69,7 +70,8 @@ pub fn ztest(image: &Input, reference: &Input) -> Option<ZTest> {
     for index in 0..image.picture.pixels.len() {
         let mut here = 0.0f64;
         for channel in 0..3 {
-            let Some((d, v)) = deviation(image, reference, index, channel) else {
+            let Some(Deviation { d, v, freedom }) = deviation(image, reference, index, channel)
+            else {
                 untested += 1;
                 continue;
             };
@@ -77,7 +79,8 @@ pub fn ztest(image: &Input, reference: &Input) -> Option<ZTest> {
             difference[channel] += d;
             variance[channel] += v;
             // Without a difference there is nothing to explain, even if both are exactly 0.
-            let z = if d == 0.0 { 0.0 } else { d.abs() / v.sqrt() };
+            let t = if d == 0.0 { 0.0 } else { d.abs() / v.sqrt() };
+            let z = as_normal(t, freedom);
             squares += z * z;
             here = here.max(z);
         }
@@ -108,8 +111,15 @@ pub fn ztest(image: &Input, reference: &Input) -> Option<ZTest> {
     })
 }
 
-/// The difference of a value and its variance; `None` where they are unknown.
-fn deviation(image: &Input, reference: &Input, index: usize, channel: usize) -> Option<(f64, f64)> {
+/// A difference, its variance, and that one's degrees of freedom.
+struct Deviation {
+    d: f64,
+    v: f64,
+    freedom: f64,
+}
+
+/// The difference of a value; `None` where its variance is unknown.
+fn deviation(image: &Input, reference: &Input, index: usize, channel: usize) -> Option<Deviation> {
     let (a, b) = (
         &image.picture.pixels[index],
         &reference.picture.pixels[index],
@@ -127,5 +137,23 @@ fn deviation(image: &Input, reference: &Input, index: usize, channel: usize) -> 
     let (a, b) = (f64::from(a[channel]), f64::from(b[channel]));
     let (error_a, error_b) = (error(&image.stderr)?, error(&reference.stderr)?);
     let rounding = ROUNDING * a.abs().max(b.abs());
-    Some((a - b, error_a.powi(2) + error_b.powi(2) + rounding.powi(2)))
+    let v = error_a.powi(2) + error_b.powi(2) + rounding.powi(2);
+    // Welch and Satterthwaite; that of rounding is known.
+    let doubt = error_a.powi(4) / freedom(image) + error_b.powi(4) / freedom(reference);
+    Some(Deviation {
+        d: a - b,
+        v,
+        freedom: if doubt > 0.0 {
+            v * v / doubt
+        } else {
+            f64::INFINITY
+        },
+    })
+}
+
+/// The degrees of freedom of an image's standard errors; infinite if its file does not say.
+fn freedom(input: &Input) -> f64 {
+    let told = input.about.get("degrees_of_freedom");
+    let told = told.and_then(|text| text.parse::<f64>().ok());
+    told.filter(|f| *f >= 1.0).unwrap_or(f64::INFINITY)
 }

@@ -70,6 +70,8 @@ pub struct GpuRenderer {
     limits: DispatchLimits,
     /// Loop iterations after which an invocation starts no further path.
     step_limit: u32,
+    /// Of all buffers and textures.
+    device_bytes: u64,
 }
 
 /// Textures that the kernel writes and buffers through which they are read.
@@ -189,6 +191,8 @@ impl GpuRenderer {
             entries: &entries,
         });
         gpu.check()?;
+        let uploads: u64 = uploaded.iter().map(|(_, buffer)| buffer.size()).sum();
+        let device_bytes = uploads + partials.size() + region.bytes();
         // A path that is begun must fit.
         let path = (u64::from(settings.max_bounces) + 1) * u64::from(ray_steps(placement, effects));
         let step_limit = LOOP_ITERATIONS.saturating_sub(path).max(1) as u32;
@@ -207,6 +211,7 @@ impl GpuRenderer {
             rate: 1.0e6,
             limits: DispatchLimits::default(),
             step_limit,
+            device_bytes,
         };
         // Some drivers compile at the first dispatch: one that does nothing takes that out of the
         // rendering's time.
@@ -474,6 +479,14 @@ impl Renderer for GpuRenderer {
         }
         Ok(window)
     }
+
+    fn show(&mut self, crop: Rect) {
+        self.crop = crop;
+    }
+
+    fn device_bytes(&self) -> u64 {
+        self.device_bytes
+    }
 }
 
 impl RegionTargets {
@@ -508,6 +521,12 @@ impl RegionTargets {
             staging: [size; 3].map(staging),
             counters: staging(size_of::<CountersRecord>() as u64),
         }
+    }
+
+    fn bytes(&self) -> u64 {
+        let texels = |t: &wgpu::Texture| u64::from(t.width()) * u64::from(t.height()) * 16;
+        let textures: u64 = self.textures.iter().map(texels).sum();
+        textures + self.staging.iter().map(wgpu::Buffer::size).sum::<u64>()
     }
 }
 

@@ -5,6 +5,7 @@
 //! content is complete ([`write_all`]), so that neither a typing error nor a full disk costs a
 //! render or an older result.
 
+pub mod aov;
 pub mod atomic;
 pub mod exr;
 pub mod metadata;
@@ -15,6 +16,7 @@ pub mod progress;
 pub mod stats;
 mod target;
 
+pub use aov::{Aov, Plane};
 pub use exr::Layer;
 pub use metadata::{Metadata, Value};
 pub use npy::read_npy;

@@ -26,9 +26,40 @@ pub fn significant(number: f64) -> String {
     }
 }
 
+/// Seconds as people say them: `0.123 s`, `12.3 s`, `12 min 30 s`, `3 h 12 min`, `5 d 2 h`.
+#[must_use]
+pub fn duration(seconds: f64) -> String {
+    if seconds < 99.95 || !seconds.is_finite() {
+        return format!("{} s", significant(seconds));
+    }
+    let whole = |unit: f64| (seconds / unit).round() as u64;
+    match whole(1.0) {
+        0..7200 => format!("{} min {} s", whole(1.0) / 60, whole(1.0) % 60),
+        7200..172_800 => format!("{} h {} min", whole(60.0) / 60, whole(60.0) % 60),
+        _ => format!("{} d {} h", whole(3600.0) / 24, whole(3600.0) % 24),
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::significant;
+    use super::{duration, significant};
+
+    #[test]
+    fn durations_are_short() {
+        for (seconds, text) in [
+            (0.01234, "0.0123 s"),
+            (99.94, "99.9 s"),
+            (99.96, "1 min 40 s"),
+            (3599.6, "60 min 0 s"),
+            (7199.4, "119 min 59 s"),
+            (7229.0, "2 h 0 min"),
+            (7231.0, "2 h 1 min"),
+            (10_799.0, "3 h 0 min"),
+            (200_000.0, "2 d 8 h"),
+        ] {
+            assert_eq!(duration(seconds), text);
+        }
+    }
 
     #[test]
     fn numbers_have_three_digits() {

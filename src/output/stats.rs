@@ -9,6 +9,7 @@ use super::{Metadata, atomic};
 use crate::error::{Error, Result};
 pub use crate::estimate::VarianceClass;
 pub use crate::film::NonFinite;
+pub use crate::ledger::Entry;
 pub use crate::render::StoppedBy;
 
 /// All that is known of a finished render. The names are those of the JSON, which users' scripts
@@ -57,6 +58,9 @@ pub struct Stats {
     pub rays: u64,
     /// The relative error, a fraction; `null` where unknown.
     pub estimated_error: Option<f64>,
+    /// Degrees of freedom of the pixels' standard errors, for Student's t; `null` where these are
+    /// unknown.
+    pub degrees_of_freedom: Option<f64>,
     /// Whether the variance, and with it the error, is one that samples can show: `finite`,
     /// `heavy-tailed`, or `infinite`, where the error is unknown.
     pub variance: VarianceClass,
@@ -68,6 +72,8 @@ pub struct Stats {
     pub first_non_finite: Option<NonFinite>,
     /// What the limit on bounces cut off.
     pub bounce_limit: BounceLimit,
+    /// How much light each setting that is not exact took; empty if all are, or were without effect.
+    pub ledger: Vec<Entry>,
     /// What ended the render.
     pub stopped_by: StoppedBy,
     /// What the user was warned of, in order.
@@ -96,6 +102,8 @@ pub struct Seconds {
     pub compile: f64,
     /// Tracing paths.
     pub render: f64,
+    /// Measuring what inexact settings took.
+    pub ledger: f64,
 }
 
 /// Paths that the limit on bounces ended while they could still have found light.
@@ -139,7 +147,7 @@ impl Stats {
     #[must_use]
     pub fn metadata(&self) -> Metadata {
         let [start, end] = self.sample_range;
-        Metadata::new()
+        let metadata = Metadata::new()
             .with("version", self.version.as_str())
             .with("scene", self.scene.as_str())
             .with("scene_hash", self.scene_hash.as_str())
@@ -151,6 +159,10 @@ impl Stats {
             .with("max_bounces", self.max_bounces)
             .with("device", self.device.name.as_str())
             .with("backend", self.device.backend.as_str())
-            .with("seconds", self.seconds.total)
+            .with("seconds", self.seconds.total);
+        match self.degrees_of_freedom {
+            Some(freedom) => metadata.with("degrees_of_freedom", freedom),
+            None => metadata,
+        }
     }
 }

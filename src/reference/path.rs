@@ -361,4 +361,12 @@ impl Renderer for ReferenceRenderer {
             tally,
         })
     }
+
+    fn show(&mut self, crop: Rect) {
+        self.settings.crop = crop;
+    }
+
+    fn device_bytes(&self) -> u64 {
+        0
+    }
 }

@@ -317,6 +317,10 @@ fn reference(study: &Study, store: &Store, ledger: &mut Ledger<'_>) -> Result<Op
         .with("max_bounces", series.max_bounces)
         .with("backend", series.backend.name())
         .with("device", opened.renderer.device().0);
+    let metadata = match film.freedom() {
+        Some(freedom) => metadata.with("degrees_of_freedom", freedom),
+        None => metadata,
+    };
     let contents = Contents {
         picture: &picture,
         layers: &layers,

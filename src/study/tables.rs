@@ -5,7 +5,7 @@ use super::bootstrap::Interval;
 use super::equal::{EqualError, EqualTime};
 use super::pictures::Pair;
 use crate::estimate::VarianceClass;
-use crate::output::numbers::{percent, significant};
+use crate::output::numbers::{duration, percent, significant};
 
 /// A table.
 #[derive(Clone, Debug)]
@@ -320,12 +320,12 @@ fn signed(fraction: f64) -> String {
     format!("{sign}{}", percent(fraction.abs()))
 }
 
-/// A time in seconds with three digits, in milliseconds if it is short.
+/// A time as people say it, in milliseconds if it is short.
 #[must_use]
 pub fn seconds(time: f64) -> String {
     match time {
         t if t < 0.1 => format!("{} ms", significant(1000.0 * t)),
-        t => format!("{} s", significant(t)),
+        t => duration(t),
     }
 }
 

@@ -1,0 +1,115 @@
+//! What the ledger says that settings took, against analytic truth and against renders.
+
+mod common;
+
+use common::{gpu, render_gpu, scene, scene_file, settings};
+use gpu_trace::backend::Backend;
+use gpu_trace::estimate::Estimate;
+use gpu_trace::ledger::{Entry, audit};
+use gpu_trace::scene::Scene;
+use gpu_trace::settings::{Integrator, Offset, Settings};
+
+fn entries(backend: &Backend, scene: &Scene, settings: &Settings) -> Vec<Entry> {
+    let film = render_gpu(scene, settings);
+    audit(backend, scene, settings, &film, &|| true).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// A room that emits, seen from its centre.
+fn furnace(albedo: f64) -> Scene {
+    scene(&format!(
+        "[camera]\nposition = [0, 0, 0]\nlook_at = [0, 0, 1]\nfov = 90.0\n[image]\nwidth = 32\n\
+         height = 32\n[material.wall]\ntype = \"diffuse\"\nalbedo = [{albedo}, {albedo}, {albedo}]\n\
+         emission = [1, 1, 1]\n[[sphere]]\ncenter = [0, 0, 0]\nradius = 1\nmaterial = \"wall\"\n"
+    ))
+}
+
+#[test]
+fn a_bounce_limit_takes_the_rest_of_the_series() {
+    // E (1 - rho^(N + 1))/(1 - rho) of E/(1 - rho); without roulette every path is alike.
+    for backend in [Backend::Gpu(Box::new(gpu())), Backend::Cpu { threads: 0 }] {
+        for (albedo, bounces) in [(0.5, 1), (0.5, 4), (0.9, 16)] {
+            let scene = furnace(albedo);
+            let settings = Settings {
+                max_bounces: bounces,
+                roulette: false,
+                integrator: Integrator::Bsdf,
+                ..settings(&scene, 32, 32, 16)
+            };
+            let entries = entries(&backend, &scene, &settings);
+            assert_eq!(entries.len(), 1);
+            let entry = &entries[0];
+            assert_eq!(
+                (entry.setting, &*entry.value),
+                ("max-bounces", &*bounces.to_string())
+            );
+            let more = f64::from(4 * bounces + 65);
+            let truth =
+                1.0 - (1.0 - albedo.powf(f64::from(bounces) + 1.0)) / (1.0 - albedo.powf(more));
+            assert!(
+                (entry.removed / truth - 1.0).abs() < 1.0e-4,
+                "{entry:?} for {truth}"
+            );
+            // Companion: one bounce more is another share.
+            assert!((entry.removed / (truth * albedo) - 1.0).abs() > 0.05);
+        }
+    }
+}
+
+#[test]
+fn an_offset_takes_what_renders_lack() {
+    let scene = scene_file("scenes/glass.toml");
+    let with = |offset, seed| Settings {
+        offset,
+        seed,
+        ..settings(&scene, 64, 48, 512)
+    };
+    let backend = Backend::Gpu(Box::new(gpu()));
+    let found = entries(&backend, &scene, &with(Offset::None, 0));
+    let entry = found
+        .iter()
+        .find(|e| e.setting == "offset")
+        .expect("an entry");
+    // Other seeds: nothing is shared with the audit.
+    let light = |offset, seed| {
+        let film = render_gpu(&scene, &with(offset, seed));
+        let count = film.rect().pixels();
+        let variance = (0..count)
+            .filter_map(|i| film.variance_of_mean(i))
+            .flatten()
+            .sum::<f64>();
+        (
+            Estimate::of(&film).mean,
+            variance.sqrt() / (3 * count) as f64,
+        )
+    };
+    let (exact, exact_error) = light(Offset::Exact, 1);
+    let (nudged, nudged_error) = light(Offset::None, 2);
+    let removed = 1.0 - nudged / exact;
+    // Channels of a pixel share their paths: at most three times the variance.
+    let error = (3.0f64).sqrt() * exact_error.hypot(nudged_error) / exact;
+    let z = (entry.removed - removed) / error.hypot(entry.standard_error);
+    assert!(
+        z.abs() < 4.0,
+        "{entry:?}, renders say {removed} within {error}"
+    );
+    // Companion: it is not nothing, by far.
+    assert!(
+        entry.removed > 20.0 * entry.standard_error && removed > 20.0 * error,
+        "{entry:?}"
+    );
+}
+
+#[test]
+fn what_takes_nothing_is_not_in_it() {
+    let backend = Backend::Gpu(Box::new(gpu()));
+    let scene = scene_file("scenes/lecture.toml");
+    assert_eq!(entries(&backend, &scene, &settings(&scene, 32, 32, 16)), []);
+    // Stopped before it is measured, it is left out.
+    let settings = Settings {
+        max_bounces: 1,
+        ..settings(&scene, 32, 32, 16)
+    };
+    let film = render_gpu(&scene, &settings);
+    let stopped = audit(&backend, &scene, &settings, &film, &|| false);
+    assert_eq!(stopped.unwrap_or_else(|e| panic!("{e}")), []);
+}
