@@ -21,6 +21,7 @@
 //! 11. [`output`]: images, statistics, progress.
 //! 12. [`input`] and [`compare`](mod@compare): images of any origin, and how far two are apart.
 //!
+//! [`study`] measures what accuracy costs in time.
 //! [`check`] measures the hard cases of all this on a device, with the tests of [`statistics`].
 //! [`error`] is what can go wrong anywhere.
 
@@ -51,3 +52,4 @@ pub mod scene;
 pub mod settings;
 pub mod shader;
 pub mod statistics;
+pub mod study;

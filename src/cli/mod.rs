@@ -3,6 +3,7 @@
 mod args;
 mod check;
 mod compare;
+mod converge;
 mod device;
 mod devices;
 mod effects;
@@ -39,6 +40,7 @@ Examples:
   gpu-trace effects my.toml                    what the kernel will hold, and why
   gpu-trace check --quick                      does this adapter stand the hard cases?
   gpu-trace compare a.exr b.exr --tolerance 1% is image a within 1 % of reference b?
+  gpu-trace converge --study cpu-gpu           error against time, as a report with plots
 
 Exit codes: 0 done; 1 failed; 2 wrong usage or a bad scene; 3 a check failed; 129, 130 or 143 ended
 by a signal, with what there was written.";
@@ -82,6 +84,9 @@ enum Command {
     /// Compare an image with a reference: errors, bias, FLIP, SSIM; exit 3 beyond a tolerance.
     #[command(after_help = compare::AFTER_HELP)]
     Compare(compare::CompareArgs),
+    /// Measure error against time for any set of ways to render: plots, tables, an HTML report.
+    #[command(after_help = converge::after_help())]
+    Converge(Box<converge::ConvergeArgs>),
     /// List the adapters, with driver and limits.
     Devices {
         /// Print JSON.
@@ -166,6 +171,7 @@ fn run(cli: Cli) -> Result<()> {
         Some(Command::Price(args)) => price::run(&args),
         Some(Command::Check(args)) => check::run(&args),
         Some(Command::Compare(args)) => compare::run(&args),
+        Some(Command::Converge(args)) => converge::run(&args),
         Some(Command::Devices { json }) => devices::run(json),
         Some(Command::Scene(SceneCommand::Check { scene })) => scene::check(&scene),
         Some(Command::Scene(SceneCommand::Schema)) => scene::schema(),

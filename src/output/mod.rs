@@ -10,6 +10,7 @@ pub mod atomic;
 pub mod exr;
 pub mod metadata;
 pub mod npy;
+pub mod numbers;
 pub mod png;
 pub mod progress;
 pub mod stats;

@@ -58,6 +58,8 @@ struct State {
     shown: Option<Instant>,
     /// The newest snapshot, until it is shown.
     pending: Option<Snapshot>,
+    /// The part of the work that snapshots are of; empty where there is one part.
+    part: String,
 }
 
 impl std::fmt::Debug for State {
@@ -125,15 +127,23 @@ impl Progress {
                 stderr,
                 shown,
                 pending: None,
+                part: String::new(),
             }),
         }
+    }
+
+    /// Names the part of the work that the following snapshots are of, as in `run 3/24`.
+    pub fn part(&self, name: &str) {
+        let mut state = self.state();
+        state.show_pending();
+        name.clone_into(&mut state.part);
     }
 
     /// Shows how far the render is. May be called as often as there is news: lines are spaced out.
     pub fn update(&self, snapshot: &Snapshot) {
         let mut state = self.state();
         if let Display::Bar(bar) = &state.display {
-            bar.set_message(snapshot.to_string());
+            bar.set_message(labelled(&state.part, snapshot));
             bar.set_position((snapshot.fraction.clamp(0.0, 1.0) * BAR_STEPS as f64) as u64);
             return;
         }
@@ -188,10 +198,14 @@ impl State {
             return;
         };
         match self.display {
-            Display::Json => self.json(&JsonLine::progress(&snapshot)),
+            Display::Json => {
+                let part = self.part.clone();
+                self.json(&JsonLine::progress(&snapshot, &part));
+            }
             Display::Plain => {
                 let percent = 100.0 * snapshot.fraction.clamp(0.0, 1.0);
-                let _ = writeln!(self.stderr, "{percent:3.0} %  {snapshot}");
+                let text = labelled(&self.part, &snapshot);
+                let _ = writeln!(self.stderr, "{percent:3.0} %  {text}");
             }
             Display::Bar(_) | Display::None => return,
         }
@@ -227,6 +241,7 @@ enum JsonLine<'a> {
     Progress {
         #[serde(rename = "type")]
         kind: &'static str,
+        part: Option<&'a str>,
         samples: u64,
         spp: u64,
         spp_total: Option<u64>,
@@ -243,10 +258,11 @@ enum JsonLine<'a> {
     },
 }
 
-impl JsonLine<'_> {
-    fn progress(snapshot: &Snapshot) -> Self {
+impl<'a> JsonLine<'a> {
+    fn progress(snapshot: &Snapshot, part: &'a str) -> Self {
         Self::Progress {
             kind: "progress",
+            part: Some(part).filter(|p| !p.is_empty()),
             samples: snapshot.samples,
             spp: snapshot.spp,
             spp_total: snapshot.spp_total,
@@ -256,6 +272,13 @@ impl JsonLine<'_> {
             paths_per_second: snapshot.paths_per_second,
             error: snapshot.error,
         }
+    }
+}
+
+fn labelled(part: &str, snapshot: &Snapshot) -> String {
+    match part {
+        "" => snapshot.to_string(),
+        part => format!("{part}  {snapshot}"),
     }
 }
 

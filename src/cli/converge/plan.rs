@@ -1,0 +1,390 @@
+//! From options to a study: everything is decided and checked before anything is rendered.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use super::args::ConvergeArgs;
+use super::host::choice;
+use crate::backend::{Backend, LEAST_PIXEL_BYTES, check_memory};
+use crate::cli::args::{BackendArg, IntegratorArg, SamplerArg};
+use crate::cli::derive;
+use crate::cli::device::open;
+use crate::error::{Error, Result};
+use crate::estimate::variance_class;
+use crate::input::{Input, read};
+use crate::output::Format;
+use crate::sampler::Sampler;
+use crate::scene::{Loaded, builtin};
+use crate::settings::{DEFAULT_TERMINATION, Integrator, Offset, Rect, Settings};
+use crate::study::analysis::Subject;
+use crate::study::conduct::{ReferenceChoice, Study};
+use crate::study::presets::{Preset, preset};
+use crate::study::run::Length;
+use crate::study::series::{BackendKind, Series, product};
+use crate::study::store::{Identity, ReferenceIdentity, Store, hash};
+
+/// Longer side of an image where nobody says: errors are per pixel, and hardly depend on it.
+const SIDE: u32 = 160;
+/// Samples a pixel where nobody says.
+const SPP: u64 = 1024;
+/// Runs of each series where nobody says.
+const SEEDS: u64 = 8;
+/// The reference's samples are so many times the largest number: its noise is subtracted, so that more
+/// would change little.
+const LONGER: u64 = 4;
+/// The seed of the study's own reference: no run may have it.
+const REFERENCE_SEED: u64 = u64::MAX;
+
+/// A study and where it goes.
+pub(super) struct Plan {
+    pub(super) study: Study,
+    pub(super) directory: PathBuf,
+}
+
+impl Plan {
+    /// All runs.
+    pub(super) fn count(&self) -> usize {
+        self.study.seeds.clone().count() * self.study.subjects.len()
+    }
+
+    /// Runs that an earlier process has finished.
+    pub(super) fn already_there(&self, store: &Store) -> usize {
+        let subjects = &self.study.subjects;
+        let mine = |key: &_| subjects.iter().any(|s| s.series.key() == *key);
+        let runs = store.runs.iter().filter(|r| r.complete && mine(&r.series));
+        runs.filter(|r| self.study.seeds.contains(&r.seed)).count()
+    }
+}
+
+/// Decides everything.
+pub(super) fn plan(args: &ConvergeArgs, warnings: &mut Vec<String>) -> Result<Plan> {
+    let preset = args.study.and_then(preset);
+    let scene = args.scene.as_deref().or(preset.map(|p| p.scene));
+    let loaded = builtin::resolve(scene)?;
+    let bare = |warning: &String| warning.trim_start_matches("warning: ").to_owned();
+    warnings.extend(loaded.warnings.iter().map(bare));
+    let spp = args.spp.or(preset.map(|p| p.spp)).unwrap_or(SPP);
+    let base = base(args, &loaded, preset);
+    check_memory(&base.crop, LEAST_PIXEL_BYTES)?;
+    let count = args.seeds.or(preset.map(|p| p.seeds)).unwrap_or(SEEDS);
+    let end = args.seed.checked_add(count).ok_or_else(|| {
+        Error::Usage(format!(
+            "--seed {}: {count} seeds from there go beyond 2^64 - 1",
+            args.seed
+        ))
+    })?;
+    let seeds = args.seed..end;
+    let file = args.reference.as_deref();
+    let file = file
+        .map(|path| reference_file(path, &loaded, &base, &seeds))
+        .transpose()?;
+    let backends = backends(args, preset, warnings)?;
+    let series = series(args, &base, preset, &backends.kinds)?;
+    let mut subjects = Vec::new();
+    for series in series {
+        let settings = series.settings(&base, args.seed);
+        let (placement, _) = derive(&loaded.scene, &settings)?;
+        subjects.push(Subject {
+            series,
+            variance: variance_class(&loaded.scene, &placement, &settings).class,
+        });
+    }
+    let (reference, reference_identity) = match file {
+        Some((input, hash)) => {
+            warnings.extend(
+                input
+                    .notes
+                    .iter()
+                    .map(|note| format!("{}: {note}", input.path.display())),
+            );
+            let identity = ReferenceIdentity::File {
+                path: input.path.clone(),
+                hash,
+            };
+            (ReferenceChoice::File(Box::new(input)), identity)
+        }
+        None => own_reference(args, preset, &base, &subjects, spp, &backends),
+    };
+    let rect = base.crop;
+    let identity = Identity {
+        version: env!("CARGO_PKG_VERSION").into(),
+        scene: loaded.name.clone(),
+        scene_hash: loaded.hash.clone(),
+        size: [rect.width, rect.height],
+        spp,
+        time: args.time.map(|t| t.as_secs_f64()),
+        reference: reference_identity,
+        threads: args.threads.map_or(0, usize::from),
+        gpu: backends.gpu,
+    };
+    let directory = args.output.clone().unwrap_or_else(|| {
+        let what = preset.map_or("converge", |p| p.name);
+        PathBuf::from(format!("{}-{what}", loaded.name))
+    });
+    let shown = preset.map_or(&[][..], |p| p.shown).iter().copied();
+    Ok(Plan {
+        study: Study {
+            title: preset.map_or("Error against time", |p| p.title).into(),
+            subjects,
+            seeds,
+            length: Length {
+                spp,
+                seconds: identity.time,
+            },
+            reference,
+            shown: shown.filter(|n| *n <= spp).collect(),
+            exposure: args.exposure,
+            command: command(),
+            identity,
+            loaded,
+            base,
+        },
+        directory,
+    })
+}
+
+fn base(args: &ConvergeArgs, loaded: &Loaded, preset: Option<&Preset>) -> Settings {
+    let mut settings = Settings::for_scene(&loaded.scene);
+    let side = preset.map_or(SIDE, |p| p.side);
+    let (width, height) = (loaded.scene.width, loaded.scene.height);
+    let scale = (f64::from(side) / f64::from(width.max(height))).min(1.0);
+    let small = |n: u32| ((f64::from(n) * scale).round() as u32).max(1);
+    (settings.width, settings.height) = args.size.unwrap_or((small(width), small(height)));
+    settings.crop = Rect {
+        x: 0,
+        y: 0,
+        width: settings.width,
+        height: settings.height,
+    };
+    settings
+}
+
+/// What renders, once it is known what there is.
+struct Backends {
+    kinds: Vec<BackendKind>,
+    /// The GPU's name, if one is used or could be.
+    gpu: Option<String>,
+}
+
+fn backends(
+    args: &ConvergeArgs,
+    preset: Option<&Preset>,
+    warnings: &mut Vec<String>,
+) -> Result<Backends> {
+    let wanted: Vec<BackendArg> = match preset {
+        _ if !args.backends.is_empty() => args.backends.clone(),
+        Some(preset) if !preset.backends.is_empty() => {
+            let arg = |kind: &BackendKind| match kind {
+                BackendKind::Gpu => BackendArg::Gpu,
+                BackendKind::Cpu => BackendArg::Cpu,
+            };
+            preset.backends.iter().map(arg).collect()
+        }
+        _ => vec![BackendArg::Auto],
+    };
+    if args.device.is_some() && wanted.iter().all(|b| *b == BackendArg::Cpu) {
+        return Err(Error::Usage(
+            "--device chooses a GPU, --backends cpu uses none".into(),
+        ));
+    }
+    let mut found = Backends {
+        kinds: Vec::new(),
+        gpu: None,
+    };
+    let reference = args.reference_backend.filter(|b| *b == BackendArg::Gpu);
+    for backend in wanted.iter().copied().chain(reference) {
+        let opened = open(&choice(args, backend), warnings)?;
+        let kind = match &opened {
+            Backend::Gpu(gpu) => {
+                found.gpu = Some(gpu.summary.name.clone());
+                BackendKind::Gpu
+            }
+            Backend::Cpu { .. } => BackendKind::Cpu,
+        };
+        if !found.kinds.contains(&kind) && found.kinds.len() < wanted.len() {
+            found.kinds.push(kind);
+        }
+    }
+    Ok(found)
+}
+
+/// The series, without repetitions.
+fn series(
+    args: &ConvergeArgs,
+    base: &Settings,
+    preset: Option<&Preset>,
+    backends: &[BackendKind],
+) -> Result<Vec<Series>> {
+    let termination = args.termination.unwrap_or(DEFAULT_TERMINATION);
+    let integrator = |arg: &IntegratorArg| match arg {
+        IntegratorArg::Path => Integrator::Path,
+        IntegratorArg::Bsdf => Integrator::Bsdf,
+        IntegratorArg::Nee => Integrator::Nee,
+        IntegratorArg::Lecture => Integrator::Lecture { termination },
+    };
+    let sampler = |arg: &SamplerArg| match arg {
+        SamplerArg::Sobol => Sampler::Sobol,
+        SamplerArg::Independent => Sampler::Independent,
+    };
+    let integrators: Vec<Integrator> = match preset {
+        _ if !args.integrators.is_empty() => args.integrators.iter().map(integrator).collect(),
+        Some(preset) if preset.integrators.is_empty() => vec![base.integrator],
+        Some(preset) => preset
+            .integrators
+            .iter()
+            .map(|i| match i {
+                Integrator::Lecture { .. } => Integrator::Lecture { termination },
+                other => *other,
+            })
+            .collect(),
+        None => vec![Integrator::Path, Integrator::Lecture { termination }],
+    };
+    let lecture = |i: &Integrator| matches!(i, Integrator::Lecture { .. });
+    if args.termination.is_some() && !integrators.iter().any(lecture) {
+        return Err(Error::Usage(
+            "--termination is the lecture's: add lecture to --integrators".into(),
+        ));
+    }
+    let samplers: Vec<Sampler> = args.samplers.iter().map(sampler).collect();
+    let samplers = match preset {
+        None if samplers.is_empty() => vec![Sampler::Sobol, Sampler::Independent],
+        _ => or(samplers, preset.map(|p| p.samplers), Sampler::default()),
+    };
+    let offsets = or(
+        args.offsets.clone(),
+        preset.map(|p| p.offsets),
+        Offset::Exact,
+    );
+    let bounces = or(args.max_bounces.clone(), None, base.max_bounces);
+    let exact_on_cpu = preset.is_some_and(|p| p.exact_on_cpu) && args.backends.is_empty();
+    let mut all: Vec<Series> = Vec::new();
+    for series in product(&integrators, &samplers, backends, &offsets, &bounces) {
+        let left_out =
+            exact_on_cpu && series.backend == BackendKind::Cpu && series.offset != Offset::Exact;
+        if !left_out && !all.contains(&series) {
+            all.push(series);
+        }
+    }
+    Ok(all)
+}
+
+/// What was given, or the study's, or the one default.
+fn or<T: Copy>(given: Vec<T>, preset: Option<&[T]>, default: T) -> Vec<T> {
+    match preset {
+        _ if !given.is_empty() => given,
+        Some(preset) if !preset.is_empty() => preset.to_vec(),
+        _ => vec![default],
+    }
+}
+
+/// The study's own reference: the scene's usual estimator with the best sampler and the most bounces, so
+/// that a lower limit shows as the bias that it is.
+fn own_reference(
+    args: &ConvergeArgs,
+    preset: Option<&Preset>,
+    base: &Settings,
+    subjects: &[Subject],
+    spp: u64,
+    backends: &Backends,
+) -> (ReferenceChoice, ReferenceIdentity) {
+    let backend = match args.reference_backend {
+        Some(BackendArg::Cpu) => BackendKind::Cpu,
+        Some(BackendArg::Gpu) => BackendKind::Gpu,
+        _ => match preset.and_then(|p| p.reference) {
+            Some(kind) => kind,
+            None if backends.gpu.is_some() => BackendKind::Gpu,
+            None => BackendKind::Cpu,
+        },
+    };
+    let bounces = subjects.iter().map(|s| s.series.max_bounces).max();
+    let series = Series {
+        integrator: base.integrator,
+        sampler: Sampler::Sobol,
+        backend,
+        offset: Offset::Exact,
+        max_bounces: base.max_bounces.max(bounces.unwrap_or(0)),
+    };
+    let usual = match preset {
+        Some(preset) if args.spp.is_none() => preset.reference_spp,
+        _ => spp.saturating_mul(LONGER).max(SPP),
+    };
+    let spp = args.reference_spp.unwrap_or(usual);
+    let seed = REFERENCE_SEED;
+    let identity = ReferenceIdentity::Own {
+        backend: backend.name().into(),
+        integrator: series.integrator.name().into(),
+        spp,
+        seed,
+        max_bounces: series.max_bounces,
+    };
+    (ReferenceChoice::Own { series, spp, seed }, identity)
+}
+
+/// The reference in a file, and the hash of its bytes. Refuses what is not of this scene and size, with
+/// both facts, and what shares samples with the runs.
+fn reference_file(
+    path: &Path,
+    loaded: &Loaded,
+    base: &Settings,
+    seeds: &std::ops::Range<u64>,
+) -> Result<(Input, String)> {
+    let input = read(path)?;
+    let (shown, picture) = (path.display(), &input.picture);
+    if (picture.width, picture.height) != (base.width, base.height) {
+        let there = format!("{}x{}", picture.width, picture.height);
+        return Err(Error::Usage(format!(
+            "the sizes differ: {shown} has {there} pixels, the study {}x{}; if it shows the whole image, \
+             add --size {there}",
+            base.width, base.height
+        )));
+    }
+    if input.format == Format::Png {
+        return Err(Error::Usage(format!(
+            "{shown} is a PNG file, which holds nothing above 1 and rounds the rest: use EXR or NPY"
+        )));
+    }
+    let about = |name: &str| input.about.get(name).map(String::as_str);
+    if let Some(there) = about("scene_hash").filter(|there| *there != loaded.hash) {
+        let scene = about("scene").unwrap_or("?").escape_debug().to_string();
+        return Err(Error::Usage(format!(
+            "the scenes differ: {shown} shows {scene} ({}), the study is of {} ({})",
+            there.escape_debug(),
+            loaded.name,
+            loaded.hash
+        )));
+    }
+    if let Some(seed) = about("seed")
+        .and_then(|s| s.parse::<u64>().ok())
+        .filter(|s| seeds.contains(s))
+    {
+        return Err(Error::Usage(format!(
+            "{shown} was rendered with seed {seed}, and the study has seeds {} to {}: both would share \
+             samples; choose others with --seed, as in --seed {}",
+            seeds.start,
+            seeds.end - 1,
+            seed.wrapping_add(1)
+        )));
+    }
+    let bytes = fs::read(path).map_err(|source| Error::File {
+        action: "cannot read",
+        path: path.to_owned(),
+        source,
+    })?;
+    Ok((input, hash(&bytes)))
+}
+
+/// What was typed, as a shell takes it.
+fn command() -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./:,=%+".contains(c);
+    let quoted = |word: String| match !word.is_empty() && word.chars().all(plain) {
+        true => word,
+        false => format!("'{}'", word.replace('\'', "'\\''")),
+    };
+    let words = std::env::args_os()
+        .skip(1)
+        .map(|w| quoted(w.to_string_lossy().into_owned()));
+    std::iter::once("gpu-trace".to_owned())
+        .chain(words)
+        .collect::<Vec<_>>()
+        .join(" ")
+}

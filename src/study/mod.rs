@@ -1,0 +1,27 @@
+//! Studies: what accuracy costs in time, for any set of ways to render.
+//!
+//! 1. [`series`]: what is compared. [`presets`]: the built-in studies.
+//! 2. [`conduct`](mod@conduct): the reference, the runs in turns, images at equal time. [`run`]: one
+//!    series with one seed. [`measure`]: its error against the reference.
+//! 3. [`store`]: the directory with all that is finished, so that a study can go on.
+//! 4. [`analysis`]: what the runs say, by [`fit`] and [`bootstrap`]; [`equal`]: at equal time and error.
+//! 5. [`tables`], [`plot`], [`pictures`], [`export`] and [`report`]: how it is shown.
+
+pub mod analysis;
+pub mod bootstrap;
+pub mod conduct;
+pub mod equal;
+pub mod export;
+pub mod fit;
+mod ledger;
+pub mod measure;
+pub mod pictures;
+pub mod plot;
+pub mod presets;
+pub mod report;
+pub mod run;
+pub mod series;
+pub mod store;
+pub mod summary;
+pub mod tables;
+mod ticks;

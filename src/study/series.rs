@@ -1,0 +1,248 @@
+//! What is compared: series, each one combination of the ways to render.
+
+use serde::{Deserialize, Serialize};
+
+use crate::sampler::Sampler;
+use crate::settings::{Integrator, Offset, Settings};
+
+/// What renders.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum BackendKind {
+    /// In f32, through wgpu.
+    Gpu,
+    /// In f64, on the processor's cores.
+    Cpu,
+}
+
+impl BackendKind {
+    /// The name on the command line.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Gpu => "gpu",
+            Self::Cpu => "cpu",
+        }
+    }
+}
+
+/// One way to render; a run is a series with a seed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Series {
+    /// The estimator.
+    pub integrator: Integrator,
+    /// How random numbers are placed.
+    pub sampler: Sampler,
+    /// What renders.
+    pub backend: BackendKind,
+    /// How a path leaves a surface.
+    pub offset: Offset,
+    /// The most scattering events of a path.
+    pub max_bounces: u32,
+}
+
+/// A series as files name it: runs belong to the series whose key is the same.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Key {
+    /// Name of the integrator.
+    pub integrator: String,
+    /// Probability of termination of the lecture's estimator.
+    pub termination: Option<f64>,
+    /// Name of the sampler.
+    pub sampler: String,
+    /// What renders.
+    pub backend: BackendKind,
+    /// As in `--offset`.
+    pub offset: String,
+    /// The most scattering events of a path.
+    pub max_bounces: u32,
+}
+
+impl Series {
+    /// The settings of a run; all that a series does not say is as in `base`.
+    #[must_use]
+    pub fn settings(&self, base: &Settings, seed: u64) -> Settings {
+        Settings {
+            seed,
+            max_bounces: self.max_bounces,
+            integrator: self.integrator,
+            sampler: self.sampler,
+            offset: self.offset,
+            roulette: !matches!(self.integrator, Integrator::Lecture { .. }),
+            ..base.clone()
+        }
+    }
+
+    /// What names it in files.
+    #[must_use]
+    pub fn key(&self) -> Key {
+        Key {
+            integrator: self.integrator.name().into(),
+            termination: match self.integrator {
+                Integrator::Lecture { termination } => Some(termination),
+                _ => None,
+            },
+            sampler: self.sampler.name().into(),
+            backend: self.backend,
+            offset: self.offset.to_string(),
+            max_bounces: self.max_bounces,
+        }
+    }
+
+    /// A name that any file system takes.
+    #[must_use]
+    pub fn slug(&self) -> String {
+        let Key {
+            integrator,
+            sampler,
+            backend,
+            offset,
+            max_bounces,
+            ..
+        } = self.key();
+        let offset = offset.replace([':', '+'], "");
+        let backend = backend.name();
+        format!("{integrator}-{sampler}-{backend}-{offset}-{max_bounces}")
+    }
+
+    /// The same paths in f64 without any nudge: what rounding and nudges are told by.
+    #[must_use]
+    pub fn truth(&self) -> Self {
+        Self {
+            backend: BackendKind::Cpu,
+            offset: Offset::Exact,
+            ..*self
+        }
+    }
+
+    /// What tells series apart, in the order of labels; the usual offset needs no word.
+    fn parts(&self) -> [String; 5] {
+        [
+            self.integrator.name().into(),
+            self.sampler.name().into(),
+            match self.backend {
+                BackendKind::Gpu => "GPU f32".into(),
+                BackendKind::Cpu => "CPU f64".into(),
+            },
+            match self.offset {
+                Offset::Exact => String::new(),
+                Offset::Back(x) => format!("back:{x:e}"),
+                Offset::Out(x) => format!("out:{x:e}"),
+                other => other.to_string(),
+            },
+            match self.max_bounces {
+                1 => "1 bounce".into(),
+                n => format!("{n} bounces"),
+            },
+        ]
+    }
+}
+
+/// A short name for each series: only what differs between them.
+#[must_use]
+pub fn labels(series: &[Series]) -> Vec<String> {
+    let parts: Vec<[String; 5]> = series.iter().map(Series::parts).collect();
+    let differs = |i: usize| parts.iter().any(|p| p[i] != parts[0][i]);
+    let mut shown: Vec<usize> = (0..5).filter(|i| differs(*i)).collect();
+    if shown.is_empty() {
+        shown = vec![0, 1];
+    }
+    let label = |p: &[String; 5]| {
+        let words = shown.iter().map(|i| p[*i].as_str());
+        let words: Vec<&str> = words.filter(|word| !word.is_empty()).collect();
+        match words.is_empty() {
+            true => "exact".to_owned(),
+            false => words.join(" · "),
+        }
+    };
+    parts.iter().map(label).collect()
+}
+
+/// All combinations, integrators varying slowest.
+#[must_use]
+pub fn product(
+    integrators: &[Integrator],
+    samplers: &[Sampler],
+    backends: &[BackendKind],
+    offsets: &[Offset],
+    max_bounces: &[u32],
+) -> Vec<Series> {
+    let mut all = Vec::new();
+    for &integrator in integrators {
+        for &sampler in samplers {
+            for &backend in backends {
+                for &offset in offsets {
+                    for &max_bounces in max_bounces {
+                        all.push(Series {
+                            integrator,
+                            sampler,
+                            backend,
+                            offset,
+                            max_bounces,
+                        });
+                    }
+                }
+            }
+        }
+    }
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn all() -> Vec<Series> {
+        product(
+            &[Integrator::Bsdf, Integrator::Lecture { termination: 0.25 }],
+            &[Sampler::Sobol],
+            &[BackendKind::Gpu, BackendKind::Cpu],
+            &[Offset::Exact],
+            &[64],
+        )
+    }
+
+    #[test]
+    fn labels_say_what_differs_and_no_more() {
+        assert_eq!(
+            labels(&all()),
+            [
+                "bsdf · GPU f32",
+                "bsdf · CPU f64",
+                "lecture · GPU f32",
+                "lecture · CPU f64"
+            ]
+        );
+        assert_eq!(labels(&all()[..1]), ["bsdf · sobol"]);
+        let offsets =
+            [Offset::Exact, Offset::Out(1.0e-4)].map(|offset| Series { offset, ..all()[0] });
+        assert_eq!(labels(&offsets), ["exact", "out:1e-4"]);
+        let cpu = all()[1];
+        assert_eq!(
+            labels(&[offsets[1], cpu]),
+            ["GPU f32 · out:1e-4", "CPU f64"]
+        );
+    }
+
+    #[test]
+    fn keys_survive_files_and_slugs_differ() {
+        let all = all();
+        for series in &all {
+            let text = serde_json::to_string(&series.key()).expect("JSON");
+            let key: Key = serde_json::from_str(&text).expect("a key");
+            assert_eq!(key, series.key());
+        }
+        let nudged = Series {
+            offset: Offset::Out(1.0e-4),
+            ..all[0]
+        };
+        let mut slugs: Vec<String> = all.iter().chain([&nudged]).map(Series::slug).collect();
+        assert!(
+            slugs.iter().all(|s| !s.contains([':', '/', ' '])),
+            "{slugs:?}"
+        );
+        slugs.sort();
+        slugs.dedup();
+        assert_eq!(slugs.len(), 5);
+    }
+}
