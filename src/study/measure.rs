@@ -192,6 +192,7 @@ mod tests {
             rect,
             samples: 0..1,
             batch: 4,
+            aovs: Vec::new(),
             pixels: values.iter().map(pixel).collect(),
             tally: Tally::default(),
         });
