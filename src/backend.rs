@@ -56,7 +56,9 @@ impl Backend {
             )?),
         };
         // After the driver has taken its part.
-        check_memory(&settings.crop, self.pixel_bytes())?;
+        // The pilot has a film of its own.
+        let pilot = if settings.adaptive { 48 } else { 0 };
+        check_memory(&settings.crop, self.pixel_bytes() + pilot)?;
         Ok(renderer)
     }
 

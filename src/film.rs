@@ -27,8 +27,8 @@ pub fn window_end(start: u64, end: u64) -> u64 {
 pub const LEAST_SAMPLES: u64 = 64;
 
 /// The number of samples at which the error is looked at next, after a look at `samples`: a quarter
-/// more. Every look is a chance to stop by luck, so that there should be few (numerics: geometric
-/// check times); what it costs is a render that is an eighth too long on average.
+/// more. Every look is a chance to stop by luck, so that there should be few; what it costs is a render
+/// that is an eighth too long on average.
 #[must_use]
 pub fn next_look(samples: u64) -> u64 {
     LEAST_SAMPLES.max(samples.saturating_add(samples / 4))

@@ -189,9 +189,10 @@ impl Run<'_> {
     fn fill(&mut self, film: &mut Film, range: Range<u64>) -> StoppedBy {
         let mut start = range.start;
         let mut look = next_look(0);
+        let counts = film.allocation().counts();
         while start < range.end {
             let end = window_end(start, range.end);
-            for step in 0..film.steps() {
+            for step in (0..film.steps()).filter(|s| counts[usize::from(*s)] > 0) {
                 let part = start << step..end << step;
                 if let Err(stopped_by) = self.windows(film, step, part, 0) {
                     return stopped_by;

@@ -13,11 +13,13 @@ use gpu_trace::film::{Film, PixelSums, Tally, Window, next_look, window_end};
 use gpu_trace::gpu::renderer::{DispatchLimits, GpuRenderer};
 use gpu_trace::render::{Control, PILOT_SAMPLES, Renderer as _, render_quietly};
 use gpu_trace::scene::Scene;
-use gpu_trace::settings::{Rect, Settings};
+use gpu_trace::settings::{Integrator, Rect, Settings};
 use gpu_trace::statistics::mean_and_error;
 
 fn adaptive(scene: &Scene, width: u32, height: u32, spp: u64) -> Settings {
     Settings {
+        // Where nothing looks for lamps, they are found by chance.
+        integrator: Integrator::Bsdf,
         adaptive: true,
         ..settings(scene, width, height, spp)
     }

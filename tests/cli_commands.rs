@@ -8,8 +8,9 @@ use serde_json::{Value, json};
 
 /// All commands, and all options of `render`.
 const COMMANDS: &str = "render effects price check compare converge devices scene completions man";
-const OPTIONS: &str = "--output --stats --exposure --dump-wgsl --progress --quiet --verbose --spp \
-    --error --time --sample-range --size --crop --seed --integrator --light-sampling --sampler --max-bounces \
+const OPTIONS: &str = "--output --stats --aov --exposure --dump-wgsl --progress --quiet --verbose \
+    --spp --adaptive --error --time --sample-range --size --crop --seed --integrator \
+    --light-sampling --sampler --max-bounces \
     --roulette --termination --backend --device --offset --geometry --threads --allow-non-finite";
 
 #[test]
