@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 const COMMANDS: &str = "render effects price check compare converge devices scene completions man";
 const OPTIONS: &str = "--output --stats --exposure --dump-wgsl --progress --quiet --verbose --spp \
     --error --time --sample-range --size --crop --seed --integrator --sampler --max-bounces \
-    --roulette --termination --backend --device --offset --geometry --threads --allow-non-finite";
+    --roulette --termination --backend --device --offset --geometry --threads --allow-non-finite --aov";
 
 #[test]
 fn the_kernel_holds_what_the_scene_asks_for() {
