@@ -4,6 +4,7 @@ use crate::effects::Effects;
 use crate::error::{Error, Result};
 use crate::gpu::device::Gpu;
 use crate::gpu::renderer::GpuRenderer;
+use crate::output::numbers::significant;
 use crate::placement::Placement;
 use crate::reference::path::ReferenceRenderer;
 use crate::render::Renderer;
@@ -91,10 +92,10 @@ pub fn check_memory(crop: &Rect, pixel_bytes: usize) -> Result<()> {
         return Ok(());
     }
     Err(Error::Usage(format!(
-        "{}x{} pixels need {:.3} GiB of memory, more than there is: choose a smaller --size, or \
+        "{}x{} pixels need {} GiB of memory, more than there is: choose a smaller --size, or \
          render parts of the image with --crop",
         crop.width,
         crop.height,
-        bytes as f64 / f64::from(1 << 30),
+        significant(bytes as f64 / f64::from(1 << 30)),
     )))
 }

@@ -241,6 +241,7 @@ enum JsonLine<'a> {
     Progress {
         #[serde(rename = "type")]
         kind: &'static str,
+        #[serde(skip_serializing_if = "Option::is_none")]
         part: Option<&'a str>,
         samples: u64,
         spp: u64,

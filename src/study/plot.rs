@@ -191,7 +191,7 @@ impl Plot {
         let (bottom, right) = (HEIGHT - BOTTOM, frame.width - frame.right);
         let samples = self.x == Axis::Samples;
         let across = if samples {
-            doublings(frame.x)
+            doublings(frame.x, frame.x(2.0) - frame.x(1.0))
         } else {
             decades(frame.x, frame.x(10.0) - frame.x(1.0) > 130.0)
         };

@@ -23,11 +23,11 @@ pub(super) fn decades([low, high]: [f64; 2], room: bool) -> Vec<Tick> {
     ticks.filter(|t| (low..=high).contains(&t.at)).collect()
 }
 
-/// Ticks at powers of two; over many of them, those of 4 or 16 have numbers.
-pub(super) fn doublings([low, high]: [f64; 2]) -> Vec<Tick> {
-    let step = match (high / low).log2() {
-        n if n < 7.0 => 1,
-        n if n < 14.0 => 2,
+/// Ticks at powers of two, `room` pixels apart; so many of them have numbers as fit.
+pub(super) fn doublings([low, high]: [f64; 2], room: f64) -> Vec<Tick> {
+    let step = match 38.0 / room {
+        n if n < 1.0 => 1,
+        n if n < 2.0 => 2,
         _ => 4,
     };
     let powers = low.log2().ceil() as i32..=high.log2().floor() as i32;
@@ -63,6 +63,6 @@ mod tests {
         let labelled = |ticks: Vec<Tick>| ticks.iter().filter(|t| t.labelled).count();
         assert_eq!(labelled(decades([0.9, 11.0], true)), 4);
         assert_eq!(labelled(decades([0.01, 1000.0], false)), 6);
-        assert_eq!(labelled(doublings([1.0, 1024.0])), 6);
+        assert_eq!(labelled(doublings([1.0, 1024.0], 30.0)), 6);
     }
 }
