@@ -1,5 +1,6 @@
 //! What renders: an opened GPU, or the CPU reference.
 
+use crate::aov::AovSums;
 use crate::effects::Effects;
 use crate::error::{Error, Result};
 use crate::gpu::device::Gpu;
@@ -57,21 +58,28 @@ impl Backend {
             )?),
         };
         // After the driver has taken its part.
-        // The pilot has a film of its own.
-        let pilot = if settings.adaptive { 48 } else { 0 };
-        check_memory(&settings.crop, self.pixel_bytes() + pilot)?;
+        check_memory(&settings.crop, self.pixel_bytes(settings))?;
         Ok(renderer)
     }
 
     /// Bytes of this program's memory that a pixel takes in a render, at most.
     #[must_use]
-    pub fn pixel_bytes(&self) -> usize {
-        match self {
+    pub fn pixel_bytes(&self, settings: &Settings) -> usize {
+        let image = match self {
             // 48 each in film and window, and room for the files.
             Self::Gpu(_) => LEAST_PIXEL_BYTES,
             // The reference's sums in the middle of a window are larger.
             Self::Cpu { .. } => 2 * LEAST_PIXEL_BYTES,
-        }
+        };
+        // The pilot has a film of its own.
+        let pilot = if settings.adaptive { 48 } else { 0 };
+        // In film, window and renderer, and in the files.
+        let aovs = if settings.has_aovs() {
+            4 * size_of::<AovSums>()
+        } else {
+            0
+        };
+        image + pilot + aovs
     }
 }
 

@@ -25,7 +25,7 @@ pub struct Estimate {
 }
 
 /// What a standard normal deviate exceeds in 5 % of all cases.
-const UPPER: f64 = 1.6449;
+pub(crate) const UPPER: f64 = 1.6449;
 
 impl Estimate {
     /// The estimate of a film.

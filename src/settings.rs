@@ -54,6 +54,12 @@ pub struct Settings {
 }
 
 impl Settings {
+    /// Whether pixels keep anything beside their light.
+    #[must_use]
+    pub fn has_aovs(&self) -> bool {
+        self.classes || self.features
+    }
+
     /// The defaults for `scene`.
     #[must_use]
     pub fn for_scene(scene: &Scene) -> Self {

@@ -314,8 +314,8 @@ fn renders_with_standard_errors_are_told_apart() {
     let a = gpu_trace::input::read(&folder.path("a.exr")).unwrap_or_else(|e| panic!("{e}"));
     let freedom = folder.json("a.json")["degrees_of_freedom"].as_f64();
     assert_eq!(a.about["degrees_of_freedom"].parse().ok(), freedom);
-    // 4 and 12 batches of 4, 12 of 16: 256²/(16²/3 + 48²/11 + 192²/11).
-    near(freedom.expect("a number"), 17.9745, 1.0e-3);
+    // 4 and 12 batches of 4, 4 and 8 of 16: 256²/(16²/3 + 48²/11 + 64²/3 + 128²/7).
+    near(freedom.expect("a number"), 16.3811, 1.0e-3);
     let text = folder.ok("compare a.exr b.exr --metric z");
     holds(&text, &["ok: the standard errors explain"]);
     // Companion: a lamp that is 5 % brighter.

@@ -61,6 +61,8 @@ fn an_offset_takes_what_renders_lack() {
     let with = |offset, seed| Settings {
         offset,
         seed,
+        // Which has few outliers here: rays that start in the glass make light samples worse.
+        integrator: Integrator::Bsdf,
         ..settings(&scene, 64, 48, 512)
     };
     let backend = Backend::Gpu(Box::new(gpu()));

@@ -148,7 +148,7 @@ pub(super) fn run(args: &PriceArgs) -> Result<()> {
             device,
             setup,
             compile,
-            host_bytes: backend.pixel_bytes() as u64 * pilot.pixels,
+            host_bytes: backend.pixel_bytes(&settings) as u64 * pilot.pixels,
             device_bytes: renderer.device_bytes(),
             pilot,
         };

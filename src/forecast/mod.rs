@@ -32,6 +32,9 @@ pub struct Pilot {
     /// Relative variance of a sample, for each of [`Sampler::levels`]: the mean over pixels and channels
     /// of v/(m² + (0.1 M)²), v being the variance of a batch's sum over the batch's length.
     pub variance: Vec<Measured>,
+    /// By how much the bound on the error's square, which decides when a render stops, is above it, as a
+    /// share: small, but in small images.
+    pub margin: f64,
     /// Seconds to trace a path.
     pub path_seconds: Measured,
     /// Seconds that a window takes besides: reading back, summing up, judging the error.
@@ -58,7 +61,8 @@ impl Pilot {
     /// if nothing is known of the variance.
     #[must_use]
     pub fn to_error(&self, limit: f64, most: u64) -> Option<Forecast> {
-        let least = |factor: f64| self.least_samples(limit, factor, most);
+        let bound = 1.0 + self.margin;
+        let least = |factor: f64| self.least_samples(limit, bound * factor, most);
         let spp = self.look(least(1.0)?);
         // Beyond the cap the upper end is the cap's.
         let spread = Z * self.variance_spread();
@@ -189,6 +193,7 @@ mod tests {
             start: 0,
             sampler: Sampler::Sobol,
             variance: vec![measured(9.0, 0.0), measured(4.0, 0.0), measured(1.0, 0.1)],
+            margin: 0.0,
             path_seconds: measured(1.0e-6, 0.05),
             window_seconds: 0.25,
             seconds: 1.0,

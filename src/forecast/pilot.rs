@@ -99,6 +99,7 @@ pub fn run(
         start: settings.samples.start,
         sampler: settings.sampler,
         variance: survey.pool(&parts, levels.len()),
+        margin: survey.margin(),
         path_seconds: meter.path_seconds(),
         window_seconds: meter.window_seconds() + judging(crop, &windows),
         seconds: begin.elapsed().as_secs_f64(),

@@ -1,6 +1,7 @@
 //! Variances of the whole image from those of its parts.
 
 use super::Measured;
+use crate::estimate::UPPER;
 use crate::film::Window;
 use crate::settings::Rect;
 
@@ -125,6 +126,20 @@ impl Survey {
         (shown - count..shown)
             .map(|level| self.pool_level(parts, level))
             .collect()
+    }
+
+    /// By how much the bound on the error's square, by which a render stops, is above it: see
+    /// `Estimate::error_at_most`. A share of it.
+    pub(super) fn margin(&self) -> f64 {
+        let pixels = self.relative.len() as f64;
+        let sum: f64 = self.relative.iter().sum();
+        let squares: f64 = self.relative.iter().map(|x| x * x).sum();
+        let variance = (pixels * squares / (sum * sum) - 1.0).max(0.0) / pixels;
+        if sum > 0.0 {
+            UPPER * variance.sqrt()
+        } else {
+            0.0
+        }
     }
 
     fn pool_level(&self, parts: &[Part], level: usize) -> Measured {

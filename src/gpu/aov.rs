@@ -30,7 +30,7 @@ impl AovLayout {
         let layout = Self {
             stride: stride as usize,
             classes: offset("classes"),
-            features: offset("seen_normal"),
+            features: offset("features_normal"),
             light: placement.light,
             scale: placement.scale,
             approach: placement.camera.approach,

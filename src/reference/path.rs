@@ -316,7 +316,8 @@ impl ReferenceRenderer {
 #[derive(Clone, Debug, Default)]
 struct PixelState {
     sums: PixelSums,
-    aovs: AovSums,
+    /// Only if something was asked for: they are large.
+    aovs: Option<Box<AovSums>>,
     batch: DVec3,
     in_batch: u64,
     batches: f64,
@@ -333,7 +334,9 @@ impl PixelState {
         }
         if path.radiance.is_finite() {
             self.batch += path.radiance;
-            self.aovs.add(&path.aovs);
+            if let Some(aovs) = &mut self.aovs {
+                aovs.add(&path.aovs);
+            }
         } else {
             self.tally.non_finite += 1;
             let place = NonFinite {
@@ -386,7 +389,11 @@ impl Renderer for ReferenceRenderer {
     ) -> Result<Window> {
         let crop: Rect = self.settings.crop;
         let width = crop.width as usize;
-        let mut state = vec![PixelState::default(); crop.pixels()];
+        let blank = PixelState {
+            aovs: self.settings.has_aovs().then(Box::default),
+            ..PixelState::default()
+        };
+        let mut state = vec![blank; crop.pixels()];
         let chosen = |x: usize, y: usize| tiles.is_none_or(|t| t.has_pixel(x as u32, y as u32));
         let all = (0..crop.pixels()).filter(|i| chosen(i % width, i / width));
         let all = all.count() as u64;
@@ -416,7 +423,6 @@ impl Renderer for ReferenceRenderer {
                 break;
             }
         }
-        let asked = self.settings.classes || self.settings.features;
         let mut tally = Tally::default();
         for pixel in &mut state {
             pixel.end_batch(false);
@@ -426,7 +432,10 @@ impl Renderer for ReferenceRenderer {
             rect: crop,
             samples: samples.start..start,
             batch: self.settings.sampler.batch(samples.start),
-            aovs: state.iter().filter(|_| asked).map(|s| s.aovs).collect(),
+            aovs: state
+                .iter()
+                .filter_map(|s| s.aovs.as_deref().copied())
+                .collect(),
             pixels: state.into_iter().map(|s| s.sums).collect(),
             tally,
         })
