@@ -3,8 +3,8 @@
 //! Percentile intervals of few runs are too narrow, by the ratio of a normal to a Student deviate and
 //! by sqrt((n - 1)/n): Hesterberg, "What Teachers Should Know About the Bootstrap" (2015), 4.5, widens
 //! the percentiles by both. Even so no resample goes beyond the most extreme run: with 4 runs an
-//! interval called 95 % holds the truth in some 85 % of all cases, with 8 in some 93 %, and the tests
-//! below measure just that. With fewer than 4 there is none.
+//! interval called 95 % holds the truth in some 87 % of all cases, with 8 in some 93 % (89 % where runs are
+//! as skewed as an exponential), and the tests below measure just that. With fewer than 4 there is none.
 
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
@@ -112,19 +112,19 @@ mod tests {
         Normal::standard().inverse_cdf(u + 1.0e-9)
     }
 
-    /// What the documents say of the coverage. The limits are 4 standard deviations of a share of 600
-    /// trials, some 0.05, about values that a million trials gave.
+    /// What the documents say of the coverage: 20000 trials gave these shares. The limit is 4 standard
+    /// deviations of a share of 600 trials.
     #[test]
     fn the_coverage_is_what_the_documents_say() {
-        for (count, stated) in [(4, 0.85), (8, 0.93), (16, 0.945)] {
-            let held = coverage(count, normal, 0.0);
-            println!("{count} normal runs: {held}");
-            assert!((held - stated).abs() < 0.05, "{count}: {held}");
+        let near = |held: f64, stated: f64| {
+            println!("{held} of {stated}");
+            assert!((held - stated).abs() < 4.0 * (stated * (1.0 - stated) / 600.0).sqrt());
+        };
+        for (count, stated) in [(4, 0.867), (8, 0.932), (16, 0.942)] {
+            near(coverage(count, normal, 0.0), stated);
         }
-        // Skewed by as much as an exponential.
-        let skewed = coverage(8, |u| -(1.0 - u).ln(), 1.0);
-        println!("8 exponential runs: {skewed}");
-        assert!((skewed - 0.89).abs() < 0.06, "{skewed}");
+        // As skewed as an exponential.
+        near(coverage(8, |u| -(1.0 - u).ln(), 1.0), 0.890);
     }
 
     /// The companion: another truth is not held.
