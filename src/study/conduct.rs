@@ -1,12 +1,12 @@
 //! A study from its reference to its last run.
 
 use super::analysis::{Analysis, Subject, analyse};
-use super::ledger::{Ledger, Part};
 use super::measure::{Noise, Reference};
 use super::pictures::{equal_time_image, is_of_pair, sample_image};
 use super::run::{Length, Observer, Run, advance, execute};
 use super::series::{Series, labels};
 use super::store::{Identity, REFERENCE, Store};
+use super::timetable::{Part, Timetable};
 use crate::error::{Error, Result};
 use crate::film::Film;
 use crate::input::{Input, read};
@@ -102,9 +102,9 @@ pub struct Outcome {
     pub failure: Option<Error>,
 }
 
-/// What a run shows to the ledger and keeps in the store.
+/// What a run shows to the timetable and keeps in the store.
 struct Keeper<'a, 'b> {
-    ledger: &'a mut Ledger<'b>,
+    timetable: &'a mut Timetable<'b>,
     store: &'a Store,
     slug: String,
     /// Numbers of samples whose images are kept; `None` for all.
@@ -113,8 +113,8 @@ struct Keeper<'a, 'b> {
 
 impl Observer for Keeper<'_, '_> {
     fn proceed(&mut self, paths: u64) -> bool {
-        self.ledger.report(paths);
-        !self.ledger.host.interrupted()
+        self.timetable.report(paths);
+        !self.timetable.host.interrupted()
     }
 
     fn point(&mut self, spp: u64, film: &Film) -> Result<()> {
@@ -143,8 +143,8 @@ pub fn conduct(study: &Study, store: &mut Store, host: &mut dyn Host) -> Result<
         .flat_map(|seed| (0..study.subjects.len()).map(move |i| (seed, i)))
         .collect();
     let count = turns.len();
-    let mut ledger = Ledger::new(host, study);
-    ledger.pending = turns
+    let mut timetable = Timetable::new(host, study);
+    timetable.pending = turns
         .iter()
         .filter(|(seed, i)| !is_done(store, *i, *seed))
         .map(|(_, series)| Part {
@@ -152,7 +152,7 @@ pub fn conduct(study: &Study, store: &mut Store, host: &mut dyn Host) -> Result<
             samples: study.length.spp,
         })
         .collect();
-    let Some(input) = reference(study, store, &mut ledger)? else {
+    let Some(input) = reference(study, store, &mut timetable)? else {
         return Ok(None);
     };
     let reference = Reference::new(&input)?;
@@ -163,7 +163,7 @@ pub fn conduct(study: &Study, store: &mut Store, host: &mut dyn Host) -> Result<
         if is_done(store, index, seed) {
             continue;
         }
-        if ledger.host.interrupted() {
+        if timetable.host.interrupted() {
             break;
         }
         let part = Part {
@@ -171,11 +171,11 @@ pub fn conduct(study: &Study, store: &mut Store, host: &mut dyn Host) -> Result<
             samples: study.length.spp,
         };
         let name = &names[index];
-        ledger.start(
+        timetable.start(
             &format!("run {}/{count}, {name}, seed {seed}", number + 1),
             part,
         );
-        if let Err(error) = run(study, store, &mut ledger, &reference, index, seed) {
+        if let Err(error) = run(study, store, &mut timetable, &reference, index, seed) {
             failure = Some(error);
             break;
         }
@@ -194,7 +194,7 @@ pub fn conduct(study: &Study, store: &mut Store, host: &mut dyn Host) -> Result<
         .all(|seed| (0..study.subjects.len()).all(|i| is_done(store, i, seed)));
     let mut equal_time = Vec::new();
     if complete && failure.is_none() {
-        match images_at_equal_time(study, store, &mut ledger, &analysis) {
+        match images_at_equal_time(study, store, &mut timetable, &analysis) {
             Ok(images) => equal_time = images,
             Err(error) => failure = Some(error),
         }
@@ -213,7 +213,7 @@ pub fn conduct(study: &Study, store: &mut Store, host: &mut dyn Host) -> Result<
 fn run(
     study: &Study,
     store: &mut Store,
-    ledger: &mut Ledger<'_>,
+    timetable: &mut Timetable<'_>,
     reference: &Reference,
     index: usize,
     seed: u64,
@@ -221,7 +221,7 @@ fn run(
     let subject = &study.subjects[index];
     let series = subject.series;
     let settings = series.settings(&study.base, seed);
-    let mut opened = ledger.host.open(&series, &settings)?;
+    let mut opened = timetable.host.open(&series, &settings)?;
     // Its images are those of the first seed.
     let kept: Option<&[u64]> = match seed == study.seeds.start {
         true if is_of_pair(&study.subjects, subject) => None,
@@ -229,7 +229,7 @@ fn run(
         false => Some(&[]),
     };
     let mut keeper = Keeper {
-        ledger,
+        timetable,
         store,
         slug: series.slug(),
         kept,
@@ -255,7 +255,7 @@ fn run(
 }
 
 /// The reference: from its file, or from the study's directory, or rendered and put there.
-fn reference(study: &Study, store: &Store, ledger: &mut Ledger<'_>) -> Result<Option<Input>> {
+fn reference(study: &Study, store: &Store, timetable: &mut Timetable<'_>) -> Result<Option<Input>> {
     let (series, spp, seed) = match &study.reference {
         ReferenceChoice::File(input) => return Ok(Some(Input::clone(input))),
         ReferenceChoice::Own { series, spp, seed } => (*series, *spp, *seed),
@@ -277,13 +277,13 @@ fn reference(study: &Study, store: &Store, ledger: &mut Ledger<'_>) -> Result<Op
         series: study.subjects.len(),
         samples: spp,
     };
-    ledger.pending.insert(0, part);
-    ledger.start("reference", part);
+    timetable.pending.insert(0, part);
+    timetable.start("reference", part);
     let settings = series.settings(&study.base, seed);
-    let mut opened = ledger.host.open(&series, &settings)?;
+    let mut opened = timetable.host.open(&series, &settings)?;
     let mut film = Film::new(settings.crop);
     let mut keeper = Keeper {
-        ledger,
+        timetable,
         store,
         slug: String::new(),
         kept: Some(&[]),
@@ -341,7 +341,7 @@ fn reference(study: &Study, store: &Store, ledger: &mut Ledger<'_>) -> Result<Op
 fn images_at_equal_time(
     study: &Study,
     store: &Store,
-    ledger: &mut Ledger<'_>,
+    timetable: &mut Timetable<'_>,
     analysis: &Analysis,
 ) -> Result<Vec<(usize, u64, String)>> {
     let Some(time) = analysis.equal_time.last() else {
@@ -364,16 +364,16 @@ fn images_at_equal_time(
         series: w.0,
         samples: w.1,
     };
-    ledger.pending = missing.iter().map(part).collect();
+    timetable.pending = missing.iter().map(part).collect();
     for image in &missing {
-        ledger.start("images at equal time", part(image));
+        timetable.start("images at equal time", part(image));
         let (index, spp, name) = image;
         let series = study.subjects[*index].series;
         let settings = series.settings(&study.base, study.seeds.start);
-        let mut opened = ledger.host.open(&series, &settings)?;
+        let mut opened = timetable.host.open(&series, &settings)?;
         let mut film = Film::new(settings.crop);
         let mut keeper = Keeper {
-            ledger,
+            timetable,
             store,
             slug: String::new(),
             kept: Some(&[]),

@@ -15,7 +15,7 @@ pub(super) struct Part {
 }
 
 /// Where the study is, and how long the rest will take.
-pub(super) struct Ledger<'a> {
+pub(super) struct Timetable<'a> {
     pub(super) host: &'a mut dyn Host,
     pixels: u64,
     limit: Option<f64>,
@@ -30,7 +30,7 @@ pub(super) struct Ledger<'a> {
     total: u64,
 }
 
-impl<'a> Ledger<'a> {
+impl<'a> Timetable<'a> {
     pub(super) fn new(host: &'a mut dyn Host, study: &Study) -> Self {
         let now = Instant::now();
         let none = Part {
