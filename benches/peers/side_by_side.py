@@ -274,6 +274,8 @@ def main():
     unknown = set(options.scenes) - {s.name for s in SCENES}
     if unknown:
         parser.error(f"unknown scene {', '.join(sorted(unknown))}")
+    if not pathlib.Path(options.binary).is_file():
+        parser.error(f"{options.binary}: no such file (`cargo build --release` makes it)")
     if options.turns * options.renders < 2:
         parser.error("a variance needs at least 2 renders")
     if options.quick:
