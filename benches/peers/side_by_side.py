@@ -8,8 +8,9 @@ Usage (what `cargo xtask bench peers` does, in an environment of its own):
     python3 side_by_side.py PATH/TO/gpu-trace --quick       small images: whether it works
     python3 side_by_side.py PATH/TO/gpu-trace three-lamps   one scene
 
-Compared are gpu-trace as it comes and Mitsuba's `path` with several of its samplers (`independent`
-is its default) and without emitter sampling: a loop of our own, compiled by Dr.Jit as `path` is.
+Compared are gpu-trace as it comes and with independent samples, and Mitsuba's `path` with several of
+its samplers (`independent` is its default) and without emitter sampling: a loop of our own, compiled by
+Dr.Jit as `path` is.
 Mitsuba's scenes are made of ours by tests/references/make.py. All render the same pixels, with the
 same number of samples, a box filter and the scene's bounce limit, each with its own roulette.
 
@@ -78,8 +79,9 @@ SCENES = [
 class Own:
     """gpu-trace."""
 
-    def __init__(self, binary, scene, folder):
-        self.command = [binary, "render", scene.file, "--size", f"{scene.width}x{scene.height}"]
+    def __init__(self, binary, scene, folder, *options):
+        size = f"{scene.width}x{scene.height}"
+        self.command = [binary, "render", scene.file, "--size", size, "--quiet", *options]
         self.folder = pathlib.Path(folder)
         self.stats = None
 
@@ -90,7 +92,7 @@ class Own:
     def render(self, spp, seed, *options):
         """An image in f64 and the seconds that it took."""
         image, stats = self.folder / "image.npy", self.folder / "stats.json"
-        command = [*self.command, "--spp", str(spp), "--seed", str(seed), "--quiet", *options]
+        command = [*self.command, "--spp", str(spp), "--seed", str(seed), *options]
         subprocess.run([*command, "-o", image, "--stats", stats], check=True)
         self.stats = json.loads(stats.read_text())
         return np.load(image).astype(np.float64), self.stats["seconds"]["render"]
@@ -182,10 +184,9 @@ def note(text):
     print(text, file=sys.stderr, flush=True)
 
 
-def compare(own, scene, peers, options):
+def compare(own, scene, renderers, options):
     """Take turns on one scene and print its table."""
     reference = Reference(own, scene, options.reference_spp, options.cache)
-    renderers = {**peers, "gpu-trace": own}
     samples = {name: Sample() for name in renderers}
     for renderer in renderers.values():
         renderer.render(options.spp, 0)  # compiles
@@ -298,7 +299,9 @@ def main():
                 without = Peer(description, "bsdf_path", "independent")
                 peers["Mitsuba, no emitter sampling"] = without
             own = Own(binary, scene, folder)
-            compare(own, scene, peers, options)
+            plain = Own(binary, scene, folder, "--sampler", "independent")
+            renderers = {**peers, "gpu-trace, independent": plain, "gpu-trace": own}
+            compare(own, scene, renderers, options)
             loads.append(os.getloadavg()[0])
     print(
         f"\nMitsuba {mi.__version__} {mi.variant()} (Dr.Jit {dr.__version__}), gpu-trace "
