@@ -28,8 +28,9 @@ start-up and compilation on either side; the printed ratios are medians over rat
   its noise. It counts as bias beyond 3 standard errors.
 - Error: relRMSE against the same reference, as `gpu-trace compare` has it, less the reference's own
   noise: bias is in it.
-- Time to the error asked for, if its bias is none or below a tenth of that error: one more render with as many
-  samples as should reach it; from its true error e, its seconds times (e/asked)^2.
+- Time to the error asked for, if its bias is none or below a tenth of that error: more renders, in
+  turns, with as many samples as should reach it; from their true error e, their seconds times
+  (e/asked)^2.
 """
 
 import argparse
@@ -51,6 +52,7 @@ PARTS = 8  # of the reference, each with its own seed
 REFERENCE_SEED = 1_000_000
 BIAS_ERRORS = 3.0
 BLOCK = 4
+ERROR_TURNS = 3
 MOST_SPP = 20_000  # that are rendered to reach an error
 
 
@@ -200,22 +202,36 @@ def compare(own, scene, renderers, options):
             samples[name].seconds.append(seconds)
         note(f"{scene.name}: turn {turn + 1} of {options.turns} done")
 
-    to_error = {}
+    to_error = times_to_error(scene, reference, renderers, samples, options)
+    table(scene, reference, samples, to_error, options)
+
+
+def times_to_error(scene, reference, renderers, samples, options):
+    """Samples a pixel, error reached and seconds by turn of every renderer that is not biased.
+
+    Without seconds if it would be too many samples.
+    """
+    result = {}
     for name, renderer in renderers.items():
         bias, error = reference.bias(samples[name].levels)
         if abs(bias) > max(BIAS_ERRORS * error, 0.1 * options.error):
             continue
         wanted = options.spp * samples[name].relative_variance() / options.error**2
-        if wanted > MOST_SPP:
-            to_error[name] = (math.inf, wanted, math.inf)
-            continue
         spp = renderer.samples(max(16, 16 * math.ceil(wanted / 16)))
-        note(f"{scene.name}: {name} to {100 * options.error:g} % with {spp} spp")
-        renderer.render(spp, 1)  # compiles, if another number of samples needs that
-        image, seconds = renderer.render(spp, 999_999)
-        found = reference.error(image)
-        to_error[name] = (seconds * (found / options.error) ** 2, spp, found)
-    table(scene, reference, samples, to_error, options)
+        result[name] = (spp, [], [])
+    for turn in range(1 + ERROR_TURNS):
+        for name, (spp, errors, times) in result.items():
+            if spp > MOST_SPP:
+                continue
+            note(f"{scene.name}: {name} to {100 * options.error:g} % with {spp} spp")
+            image, seconds = renderers[name].render(spp, 999_000 + turn)
+            if turn > 0:  # the first one may have had to compile
+                errors.append(reference.error(image))
+                times.append(seconds)
+    for name, (spp, errors, times) in result.items():
+        found = math.sqrt(np.mean(np.square(errors))) if errors else math.nan
+        result[name] = (spp, found, [t * (found / options.error) ** 2 for t in times])
+    return result
 
 
 def table(scene, reference, samples, to_error, options):
@@ -246,16 +262,23 @@ def table(scene, reference, samples, to_error, options):
             f"{pace * variance / best.relative_variance():.2f}",
             f"{100 * bias:+.3f} ± {100 * error:.3f}",
         ]
-        if name in to_error:
-            seconds, spp, found = to_error[name]
-            words = f"{seconds:.2f} ({spp} spp: {100 * found:.2f} %)"
-            cells.append(words if math.isfinite(found) else f"not taken ({spp:.0f} spp)")
-            known = "gpu-trace" in to_error and math.isfinite(found)
-            cells.append(f"{seconds / to_error['gpu-trace'][0]:.2f}" if known else "")
-        else:
-            cells += ["biased", ""]
+        cells += cells_to_error(to_error, name)
         print(f"| {name} | {' | '.join(cells)} |")
     sys.stdout.flush()
+
+
+def cells_to_error(to_error, name):
+    """Time to the error asked for and its ratio to gpu-trace's, as text."""
+    if name not in to_error:
+        return ["biased", ""]
+    spp, found, times = to_error[name]
+    if not times:
+        return [f"not taken ({spp} spp)", ""]
+    ratio = ""
+    if to_error.get("gpu-trace", (0, 0, []))[2]:
+        own = to_error["gpu-trace"][2]
+        ratio = f"{statistics.median(a / b for a, b in zip(times, own)):.2f}"
+    return [f"{statistics.median(times):.2f} ({spp} spp: {100 * found:.2f} %)", ratio]
 
 
 def main():
