@@ -244,7 +244,7 @@ def table(scene, reference, samples, to_error, options):
     )
     asked = f"{100 * options.error:g} %"
     print(
-        "| | Mpaths/s | as fast as gpu-trace | error | s x rel. variance | times gpu-trace's "
+        "| | Mpaths/s | of gpu-trace's | error | s x rel. variance | times gpu-trace's "
         f"| bias, % | to {asked}, s | times gpu-trace's |\n|---|---|---|---|---|---|---|---|---|"
     )
     for name, sample in samples.items():

@@ -14,8 +14,8 @@ Usage: cargo xtask bench [TABLE...] [--quick]
   geometry   spheres as constants or in a buffer
   resources  time to the first window, peak memory
   peers      Mitsuba 3 on the same scenes (installs it into target/peers with pip; needs LLVM 19,
-             as of Debian's libllvm19, for its compiled variant; takes ten minutes, with --quick
-             one, on small images that show no more than that it works)
+             as of Debian's libllvm19, for its compiled variant; takes a quarter of an hour, with
+             --quick a minute, on small images that show no more than that it works)
   hazards    how exact the kernel, a plain one and Mitsuba 3 are on scenes that are hard in f32
              (installs as peers does; writes docs/images/hazards.png; takes ten minutes)
   coverage   how often 95 % intervals hold the truth, over 200 seeds (half an hour)
