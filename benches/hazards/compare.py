@@ -19,7 +19,7 @@ shape (batches, height, width, 3); Mitsuba's are added. Statistics, on the mean 
   off by more than 1 %, or more than 5 % of the blocks are bad. `off`: all between.
 
 Mitsuba runs its integrator `path` and, where there is an LLVM for Dr.Jit (see
-benches/peers/mitsuba_lecture.py), that without emitter sampling; 64 scattering events at most, its
+benches/peers/peer.py), that without emitter sampling; 64 scattering events at most, its
 own roulette, everything else at its defaults.
 """
 
@@ -32,7 +32,7 @@ import time
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "peers"))
 
 import numpy as np
-from mitsuba_lecture import ROULETTE_DEPTH, cpu_name, mi, register_bsdf_integrator
+from peer import ROULETTE_DEPTH, cpu_name, mi, start
 from PIL import Image, ImageDraw, ImageFont
 
 BLOCK = 8
@@ -276,15 +276,9 @@ def main():
     parser.add_argument("--scene", action="append", choices=SCENES)
     options = parser.parse_args()
 
-    integrators = {"path": "path", "bsdf": "bsdf_path"}
-    try:
-        mi.set_variant("llvm_ad_rgb")
-        mi.Float(1.0)
-        register_bsdf_integrator()
-    except (ImportError, RuntimeError) as error:
-        print(f"no LLVM for Mitsuba: its slow variant ({error})", file=sys.stderr)
-        mi.set_variant("scalar_rgb")
-        integrators = {"path": "path"}
+    integrators = {"path": "path"}
+    if start():
+        integrators["bsdf"] = "bsdf_path"
 
     data, lines, opinions = {}, [], []
     for name in options.scene or SCENES:

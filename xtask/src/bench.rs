@@ -6,15 +6,16 @@ use std::process::Command;
 use crate::{cargo, program, run};
 
 const USAGE: &str = "\
-Usage: cargo xtask bench [TABLE...]
+Usage: cargo xtask bench [TABLE...] [--quick]
 
   naive      the kernel against a plain one
   unused     effects that a scene does not use
   offsets    ways to leave a surface: what each gets wrong, and costs
   geometry   spheres as constants or in a buffer
   resources  time to the first window, peak memory
-  peers      Mitsuba 3 on the same scene (installs it into target/peers with pip;
-             needs LLVM 19, as of Debian's libllvm19, for its compiled variant)
+  peers      Mitsuba 3 on the same scenes (installs it into target/peers with pip; needs LLVM 19,
+             as of Debian's libllvm19, for its compiled variant; takes a quarter of an hour, with
+             --quick a minute, on small images that show no more than that it works)
   hazards    how exact the kernel, a plain one and Mitsuba 3 are on scenes that are hard in f32
              (installs as peers does; writes docs/images/hazards.png; takes ten minutes)
   coverage   how often 95 % intervals hold the truth, over 200 seeds (half an hour)
@@ -38,6 +39,11 @@ pub(crate) fn all(tables: &[String]) -> Result<(), String> {
         print!("{USAGE}");
         return Ok(());
     }
+    let quick = tables.iter().any(|t| t == "--quick");
+    let tables: Vec<String> = tables.iter().filter(|t| *t != "--quick").cloned().collect();
+    if quick && !tables.iter().any(|t| t == "peers") {
+        return Err(format!("--quick is for `peers`\n\n{USAGE}"));
+    }
     if let Some(unknown) = tables.iter().find(|t| !KNOWN.contains(&t.as_str())) {
         return Err(format!("no benchmark '{unknown}'\n\n{USAGE}"));
     }
@@ -58,7 +64,7 @@ pub(crate) fn all(tables: &[String]) -> Result<(), String> {
         resources()?;
     }
     if tables.iter().any(|t| t == "peers") {
-        peers()?;
+        peers(quick)?;
     }
     if tables.iter().any(|t| t == "hazards") {
         hazards()?;
@@ -143,10 +149,11 @@ fn python() -> Result<PathBuf, String> {
 }
 
 /// Takes turns with Mitsuba.
-fn peers() -> Result<(), String> {
+fn peers(quick: bool) -> Result<(), String> {
     run(Command::new(python()?)
         .arg("benches/peers/side_by_side.py")
         .arg(program("release"))
+        .args(quick.then_some("--quick"))
         .env("NODEVICE_SELECT", "1"))
 }
 
