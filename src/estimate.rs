@@ -94,7 +94,9 @@ pub fn energy_cut_at_most(scene: &Scene, film: &Film) -> Option<f64> {
         .chain(scene.environment.map(|e| e.max_element()))
         .fold(0.0, f64::max);
     let estimate = Estimate::of(film);
-    if albedo >= 1.0 || estimate.is_black() {
+    // Paths of unequal weight have no such sum.
+    let uneven = film.steps() > 1;
+    if albedo >= 1.0 || uneven || estimate.is_black() {
         return None;
     }
     let removed = tally.cut_throughput / film.paths() as f64 * albedo * emitted / (1.0 - albedo);

@@ -3,16 +3,19 @@
 //! Measured, not bounded: a few samples are rendered again with the setting and without it, from the same
 //! random numbers, so that nearly all noise is in both and falls out of the difference.
 
+use std::ops::Range;
+
 use serde::Serialize;
 
 use crate::backend::Backend;
 use crate::effects::Effects;
 use crate::error::Result;
-use crate::film::{Film, Tally};
+use crate::film::{BLOCK, Film, Tally, WINDOW, window_end};
+use crate::forecast::squares;
 use crate::placement::Placement;
-use crate::render::{Status, StoppedBy, Watch, render};
+use crate::render::Control;
 use crate::scene::{MAX_BOUNCES, Scene};
-use crate::settings::{Offset, Settings};
+use crate::settings::{Offset, Rect, Settings};
 
 /// What a setting did to the light of an image.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -23,7 +26,7 @@ pub struct Entry {
     pub value: String,
     /// The share of the light that it removed, a fraction; negative if it added some.
     pub removed: f64,
-    /// The standard error of `removed`.
+    /// The standard error of `removed`; `null` in JSON where it is unknown.
     pub standard_error: f64,
     /// What it was compared with: more bounces, or exact ray origins.
     pub against: String,
@@ -72,8 +75,8 @@ fn suspects(settings: &Settings, tally: &Tally, paths: u64) -> Vec<Neutral> {
     all
 }
 
-/// Measures what each inexact setting of a finished render, which left `film`, removed. Entries are missing where `go_on` said
-/// to stop.
+/// Measures what each inexact setting of a finished render, which left `film`, removed; `None` if `go_on`
+/// said to stop.
 ///
 /// # Errors
 /// If the device fails.
@@ -83,18 +86,19 @@ pub fn audit(
     settings: &Settings,
     film: &Film,
     go_on: &dyn Fn() -> bool,
-) -> Result<Vec<Entry>> {
+) -> Result<Option<Vec<Entry>>> {
     let suspects = suspects(settings, film.tally(), film.paths());
     let mut entries = Vec::new();
     if suspects.is_empty() {
-        return Ok(entries);
+        return Ok(Some(entries));
     }
-    let Some(with) = sample(backend, scene, settings, go_on)? else {
-        return Ok(entries);
+    let plan = Plan::new(settings, film.paths());
+    let Some(with) = sample(backend, scene, settings, &plan, go_on)? else {
+        return Ok(None);
     };
     for neutral in suspects {
-        let Some(without) = sample(backend, scene, &neutral.settings, go_on)? else {
-            break;
+        let Some(without) = sample(backend, scene, &neutral.settings, &plan, go_on)? else {
+            return Ok(None);
         };
         let (removed, standard_error) = difference(&with, &without);
         entries.push(Entry {
@@ -105,51 +109,93 @@ pub fn audit(
             against: neutral.against,
         });
     }
-    Ok(entries)
+    Ok(Some(entries))
 }
 
-/// Few samples of the render's first; none if it was stopped.
+/// What the paths of one side of a comparison brought, by parts of the image that are alike by chance
+/// alone: the squares, or its pixels.
 fn sample(
     backend: &Backend,
     scene: &Scene,
     settings: &Settings,
+    plan: &Plan,
     go_on: &dyn Fn() -> bool,
-) -> Result<Option<Film>> {
+) -> Result<Option<Vec<f64>>> {
     struct Ask<'a>(&'a dyn Fn() -> bool);
-    impl Watch for Ask<'_> {
-        fn update(&mut self, _: &Status) {}
-        fn interrupted(&self) -> bool {
-            !(self.0)()
+    impl Control for Ask<'_> {
+        fn proceed(&mut self, _: u64) -> bool {
+            (self.0)()
         }
     }
-    let spp = PATHS.div_ceil(settings.crop.pixels() as u64).clamp(4, 256);
-    let start = settings.samples.start;
     let settings = Settings {
-        samples: start..start.saturating_add(spp).min(settings.samples.end),
         adaptive: false,
-        error: None,
-        time: None,
+        classes: false,
+        features: false,
+        crop: plan.squares[0],
         ..settings.clone()
     };
     let placement = Placement::with_offset(scene, settings.width, settings.height, settings.offset);
     let effects = Effects::derive(scene, &placement, &settings);
     let mut renderer = backend.renderer(scene, &placement, &effects, &settings)?;
-    let mut outcome = render(renderer.as_mut(), &settings, &mut Ask(go_on));
-    match outcome.failure.take() {
-        Some(error) => Err(error),
-        None => Ok((outcome.stopped_by == StoppedBy::Spp).then_some(outcome.film)),
+    let mut light = Vec::new();
+    for square in &plan.squares {
+        renderer.show(*square);
+        let mut pixels = vec![0.0; square.pixels()];
+        let mut start = plan.samples.start;
+        while start < plan.samples.end {
+            if !go_on() {
+                return Ok(None);
+            }
+            let samples = start..window_end(start, plan.samples.end);
+            let window = renderer.render(samples, &mut Ask(go_on))?;
+            start = window.samples.end;
+            for (sum, pixel) in pixels.iter_mut().zip(&window.pixels) {
+                *sum += pixel.sum.iter().sum::<f64>();
+            }
+        }
+        match plan.squares.len() {
+            1 => light = pixels,
+            _ => light.push(pixels.iter().sum()),
+        }
+    }
+    Ok(Some(light))
+}
+
+/// Where a comparison looks.
+struct Plan {
+    squares: Vec<Rect>,
+    samples: Range<u64>,
+}
+
+impl Plan {
+    /// [`PATHS`] paths or, of a large image, a block of every pixel; but no more than a sixteenth of the
+    /// render's `paths`, if these are many: in squares of the image if that is less than a block each.
+    fn new(settings: &Settings, paths: u64) -> Self {
+        let pixels = settings.crop.pixels() as u64;
+        let most = (paths / 16).max(PATHS / 16);
+        let wanted = PATHS.max(BLOCK * pixels).min(most) as f64;
+        let squares = squares(settings.crop, wanted / (BLOCK * pixels) as f64);
+        let seen: usize = squares.iter().map(Rect::pixels).sum();
+        let spp = ((wanted / seen as f64) as u64).clamp(BLOCK, WINDOW);
+        let Range { start, end } = settings.samples;
+        Self {
+            squares,
+            samples: start..start.saturating_add(spp).min(end),
+        }
     }
 }
 
-/// The relative difference of the light in two images of the same paths, and its standard error, since
-/// pixels are independent.
-fn difference(with: &Film, without: &Film) -> (f64, f64) {
-    let count = with.rect().pixels();
-    let light = |film: &Film, i: usize| film.mean(i).iter().sum::<f64>();
-    let total: f64 = (0..count).map(|i| light(without, i)).sum();
-    let each = |i: usize| light(without, i) - light(with, i);
-    let removed: f64 = (0..count).map(each).sum();
-    let mean = removed / count as f64;
-    let squares: f64 = (0..count).map(|i| (each(i) - mean).powi(2)).sum();
-    (removed / total, squares.sqrt() / total)
+/// The fewest parts whose spread tells an error.
+const LEAST_PARTS: usize = 16;
+
+/// The relative difference of the light of the same parts, and its standard error: that of a ratio
+/// (Cochran, "Sampling Techniques", 1977, 6.4); not a number where there are too few parts.
+fn difference(with: &[f64], without: &[f64]) -> (f64, f64) {
+    let n = with.len();
+    let total: f64 = without.iter().sum();
+    let removed = (total - with.iter().sum::<f64>()) / total;
+    let residual = |(a, b): (&f64, &f64)| ((b - a) - removed * b).powi(2);
+    let squares: f64 = with.iter().zip(without).map(residual).sum();
+    let error = (squares * n as f64 / (n as f64 - 1.0)).sqrt() / total.abs();
+    (removed, if n < LEAST_PARTS { f64::NAN } else { error })
 }

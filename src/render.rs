@@ -35,7 +35,8 @@ pub trait Renderer {
         control: &mut dyn Control,
     ) -> Result<Window>;
 
-    /// From now on renders only `crop`, which lies in what the renderer was made for.
+    /// From now on renders only `crop`, which lies in the image and is no larger, in both directions, than
+    /// what the renderer was made for.
     fn show(&mut self, crop: Rect);
 
     /// Bytes of the device's memory that are allocated for the image and the scene.
@@ -156,9 +157,9 @@ pub fn render(renderer: &mut dyn Renderer, settings: &Settings, watch: &mut dyn 
         let end = (left as f64 / allocation.mean_weight()) as u64 / BLOCK * BLOCK;
         let mut image = Film::of(allocation);
         let stopped_by = run.fill(&mut image, 0..end);
-        // Without a sample in every pixel it is the better image, and no smaller one: what stopped it
-        // was not what it shows.
-        if image.samples() > 0 {
+        // As long as it has fewer samples, the pilot is the better image. What stopped it so early was not
+        // what it shows.
+        if image.samples() > 0 && image.mean_samples() >= film.mean_samples() {
             pilot = film.samples();
             image.count(film.tally(), film.paths());
             film = image;

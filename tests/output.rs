@@ -738,7 +738,7 @@ fn statistics() -> Stats {
             throughput: f64::INFINITY,
             ..Default::default()
         },
-        ledger: Vec::new(),
+        ledger: None,
         stopped_by: stats::StoppedBy::Interrupt,
         warnings: vec!["a \"quoted\"\nwarning".into()],
     }

@@ -363,9 +363,13 @@ fn directions_have_their_density() {
         let extents: Vec<f64> = outputs.iter().map(|o| f64::from(o[3])).collect();
         let (mean, error) = mean_and_error(&extents);
         let c = cap.cosine;
-        if c >= 0.0 {
+        // At the horizon itself a driver's rounding decides on which side the centre is.
+        if c > 16.0 * ULP {
             let same = extents.iter().all(|e| *e == extents[0]);
             assert!(same, "{place:?}: the extent varies");
+        } else if c > -16.0 * ULP {
+            let near = |e: &f64| (e / cap.area - 1.0).abs() < 1.0e-3;
+            assert!(extents.iter().all(near), "{place:?}: the extent is no area");
         } else {
             assert!(
                 error * (extents.len() as f64).sqrt() < 0.28 * mean,

@@ -300,6 +300,17 @@ impl RenderArgs {
             .filter(|path| path.is_file())
     }
 
+    /// The layers, each once.
+    pub(super) fn layers(&self) -> Vec<Aov> {
+        let mut layers = Vec::new();
+        for aov in &self.aov {
+            if !layers.contains(aov) {
+                layers.push(*aov);
+            }
+        }
+        layers
+    }
+
     /// What should render.
     pub(super) fn device_choice(&self) -> Choice<'_> {
         Choice {

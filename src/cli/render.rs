@@ -80,6 +80,8 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
     let mut watch = Display::new(&progress, &signals, &job);
     let outcome = render_job(renderer.as_mut(), &job, &mut watch);
     progress.finish();
+    // Its memory is needed again.
+    drop(renderer);
     let auditing = Instant::now();
     let ledger = audit(&backend, &job, &outcome, &signals, &mut warnings);
     let auditing = auditing.elapsed();
@@ -241,18 +243,18 @@ fn audit(
     outcome: &Outcome,
     signals: &Signals,
     warnings: &mut Vec<String>,
-) -> Vec<Entry> {
+) -> Option<Vec<Entry>> {
     if matches!(
         outcome.stopped_by,
         StoppedBy::Failure | StoppedBy::Interrupt
     ) {
-        return Vec::new();
+        return None;
     }
     let (scene, settings) = (&job.loaded.scene, &job.settings);
     let go_on = || signals.code().is_none();
     ledger::audit(backend, scene, settings, &outcome.film, &go_on).unwrap_or_else(|error| {
         warnings.push(format!("what inexact settings took is unknown: {error}"));
-        Vec::new()
+        None
     })
 }
 
@@ -350,7 +352,7 @@ fn statistics(job: &Job, outcome: &Outcome, backend: &str, device: Device) -> St
             throughput: tally.cut_throughput,
             energy_at_most: energy_cut_at_most(&loaded.scene, film),
         },
-        ledger: Vec::new(),
+        ledger: None,
         stopped_by: outcome.stopped_by,
         warnings: Vec::new(),
     }
@@ -368,7 +370,7 @@ fn finish(args: &RenderArgs, job: &Job, outcome: &Outcome, stats: &Stats) -> Res
     let crop = job.settings.crop;
     let picture = Picture::new(crop.width, crop.height, outcome.film.pixels());
     let planes: Vec<Plane> = args
-        .aov
+        .layers()
         .iter()
         .map(|aov| Plane::of(*aov, &outcome.film, &outcome.estimate))
         .collect();
@@ -416,12 +418,13 @@ fn summary(job: &Job, stats: &Stats) -> String {
     } else {
         String::new()
     };
+    let entries = || stats.ledger.iter().flatten();
     let cut = match stats.bounce_limit.paths {
         0 => String::new(),
-        _ if stats.ledger.iter().any(|e| e.setting == "max-bounces") => String::new(),
+        _ if entries().any(|e| e.setting == "max-bounces") => String::new(),
         paths => format!(", max-bounces cut {paths} paths"),
     };
-    let taken: String = stats.ledger.iter().map(taken).collect();
+    let taken: String = entries().map(taken).collect();
     let lost = stats.first_non_finite.map_or_else(String::new, |first| {
         format!(
             ", {} samples not finite ({})",
@@ -448,6 +451,9 @@ fn taken(entry: &Entry) -> String {
     if !removed.is_finite() {
         return format!(", what {setting} {value} took is unknown");
     }
+    if removed == 0.0 {
+        return format!(", {setting} {value} took no light that shows");
+    }
     if removed.abs() <= 2.0 * error {
         let most = percent(removed.abs() + 2.0 * error);
         return format!(", {setting} {value} took less than {most} of the light");
@@ -455,6 +461,7 @@ fn taken(entry: &Entry) -> String {
     let verb = if removed > 0.0 { "took" } else { "added" };
     let spread = match error < 0.01 * removed.abs() {
         true => String::new(),
+        false if error.is_nan() => " (by few pixels)".into(),
         false => format!(" ± {}", percent(error)),
     };
     format!(

@@ -1,12 +1,14 @@
 //! What accuracy costs, before it is paid: samples and seconds to an error, from a short pilot.
 
 mod pilot;
+mod squares;
 mod survey;
 
 use crate::film::{LEAST_SAMPLES, WINDOW, next_look, window_end};
 use crate::sampler::Sampler;
 
 pub use pilot::run;
+pub(crate) use squares::squares;
 
 /// Two-sided quantile of the normal distribution for intervals of 95 %.
 const Z: f64 = 1.96;

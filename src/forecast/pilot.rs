@@ -4,11 +4,12 @@
 use std::ops::Range;
 use std::time::{Duration, Instant};
 
-use super::survey::{Part, Survey};
+use super::squares;
+use super::survey::{Part, Survey, floor, margin, pool};
 use super::{Measured, Pilot};
 use crate::error::Result;
 use crate::estimate::Estimate;
-use crate::film::{Film, WINDOW, Window};
+use crate::film::{BLOCK, Film, WINDOW, Window};
 use crate::render::{Control, Renderer};
 use crate::settings::{Rect, Settings};
 use crate::statistics::mean_and_error;
@@ -17,10 +18,10 @@ use crate::statistics::mean_and_error;
 const PIECES: u64 = 4;
 /// Samples of a piece: some batches, and all pieces within one window.
 const PIECE: u64 = 12;
-/// The side of the squares that stand for the image.
-const SIDE: u32 = 32;
-/// The fewest squares: fewer do not tell by themselves how much they differ.
-const FEWEST: f64 = 24.0;
+/// Index of the survey's first sample: all of them are in short batches, and in one window.
+const FIRST: u64 = 16;
+/// Pixels of an image that is always surveyed as a whole.
+const SMALL: usize = 1 << 16;
 /// Timed windows, at least and at most, where windows of the whole image are short.
 const WINDOWS: Range<usize> = 3..8;
 /// The least relative spread of the time a path takes: between minutes, clocks and other processes
@@ -47,39 +48,58 @@ pub fn run(
     };
     let crop = settings.crop;
 
-    // The first settles the driver and the size of dispatches, and does not count.
-    let first = 64 - PIECES * PIECE;
-    meter.render(0..first)?;
-    meter.times.clear();
-    let mut windows = Vec::new();
-    for piece in 0..PIECES {
-        let start = first + piece * PIECE;
-        windows.push(meter.render(start..start + PIECE)?);
-    }
-    let survey = Survey::new(crop, &windows);
+    // The first settles the driver and the size of dispatches, and does not count. It tells how much
+    // can be had.
+    let Some(first) = meter.render(0..BLOCK)? else {
+        return Ok(None);
+    };
+    let floor = floor(&first);
     let left = |meter: &Meter<'_>| {
         let seconds = budget.as_secs_f64() - begin.elapsed().as_secs_f64();
         seconds / (meter.path_seconds().value * crop.pixels() as f64)
     };
+    let levels = settings.sampler.levels();
+    let surveyed = (PIECES * PIECE) as f64;
+    let affordable = 0.5 * left(&meter) >= surveyed || crop.pixels() <= SMALL;
+    meter.times.clear();
+    let mut whole = Vec::new();
+    let rounds = if affordable { PIECES } else { 2 };
+    for piece in 0..rounds {
+        let start = FIRST + piece * PIECE;
+        let length = if affordable { PIECE } else { BLOCK };
+        let Some(window) = meter.render(start..start + length)? else {
+            return Ok(None);
+        };
+        whole.push(window);
+    }
+    let survey = affordable.then(|| Survey::new(&whole, floor));
 
     // The batches of a long render.
-    let levels = settings.sampler.levels();
-    let fast = left(&meter) >= (WINDOWS.start as u64 * WINDOW) as f64;
+    let fast = affordable && left(&meter) >= (WINDOWS.start as u64 * WINDOW) as f64;
     let ranges = ranges(levels, fast);
     let samples: u64 = ranges.iter().map(|r| r.end - r.start).sum();
-    let squares = squares(crop, left(&meter) / samples as f64);
+    let apart = if affordable { 0.0 } else { surveyed };
+    let squares = squares(crop, left(&meter) / (samples as f64 + apart));
     let timed = meter.times.len();
     let mut parts: Vec<Part> = Vec::new();
     for square in &squares {
         meter.renderer.show(*square);
-        let windows: Vec<Window> = ranges
-            .iter()
-            .map(|range| meter.render(range.clone()))
-            .collect::<Result<_>>()?;
-        if meter.stopped {
-            break;
+        let mut own = Vec::new();
+        for piece in (0..PIECES).filter(|_| !affordable) {
+            let start = FIRST + piece * PIECE;
+            own.extend(meter.render(start..start + PIECE)?);
         }
-        parts.push(survey.part(&windows));
+        let mut windows = Vec::new();
+        for range in &ranges {
+            windows.extend(meter.render(range.clone())?);
+        }
+        if meter.stopped {
+            return Ok(None);
+        }
+        parts.push(match &survey {
+            Some(survey) => survey.part(&windows),
+            None => Survey::new(&own, floor).part(&windows),
+        });
     }
     meter.renderer.show(crop);
     meter.times.truncate(timed);
@@ -88,20 +108,20 @@ pub fn run(
         while meter.times.len() < WINDOWS.start
             || (meter.times.len() < WINDOWS.end && left(&meter) > 0.0)
         {
-            meter.render(WINDOW..2 * WINDOW)?;
+            if meter.render(WINDOW..2 * WINDOW)?.is_none() {
+                return Ok(None);
+            }
         }
     }
-    if meter.stopped {
-        return Ok(None);
-    }
+    let pixels = crop.pixels();
     Ok(Some(Pilot {
-        pixels: crop.pixels() as u64,
+        pixels: pixels as u64,
         start: settings.samples.start,
         sampler: settings.sampler,
-        variance: survey.pool(&parts, levels.len()),
-        margin: survey.margin(),
+        variance: pool(&parts, survey.as_ref(), pixels, levels.len()),
+        margin: margin(&parts, survey.as_ref(), pixels),
         path_seconds: meter.path_seconds(),
-        window_seconds: meter.window_seconds() + judging(crop, &windows),
+        window_seconds: meter.window_seconds() + judging(crop, &whole),
         seconds: begin.elapsed().as_secs_f64(),
     }))
 }
@@ -114,33 +134,6 @@ fn ranges(levels: &[u64], fast: bool) -> Vec<Range<u64>> {
     between
         .map(|level| *level..level + 32)
         .chain(std::iter::once(WINDOW..WINDOW + long))
-        .collect()
-}
-
-/// Squares, one in each cell of a grid, that make up about so large a share of the image; or all of it.
-fn squares(crop: Rect, share: f64) -> Vec<Rect> {
-    let area = f64::from(SIDE * SIDE);
-    let wanted = (share * crop.pixels() as f64 / area).max(FEWEST);
-    if wanted * area >= 0.8 * crop.pixels() as f64 {
-        return vec![crop];
-    }
-    let aspect = f64::from(crop.width) / f64::from(crop.height);
-    let side = |cells: f64, size: u32| (cells.round() as u32).clamp(1, size.div_ceil(SIDE));
-    let columns = side((wanted * aspect).sqrt(), crop.width);
-    let rows = side(wanted / f64::from(columns), crop.height);
-    // A place in each cell: the R2 sequence (Roberts 2018), which is even in both directions.
-    let offset = |i: u32, ratio: f64| (0.5 + f64::from(i + 1) * ratio).fract();
-    let start = |cell: u32, cells: u32, size: u32, offset: f64| {
-        let center = (f64::from(cell) + offset) * f64::from(size) / f64::from(cells);
-        ((center - 0.5 * f64::from(SIDE)).max(0.0) as u32).min(size.saturating_sub(SIDE))
-    };
-    (0..rows * columns)
-        .map(|i| Rect {
-            x: crop.x + start(i % columns, columns, crop.width, offset(i, 0.754_877_666)),
-            y: crop.y + start(i / columns, rows, crop.height, offset(i, 0.569_840_291)),
-            width: SIDE.min(crop.width),
-            height: SIDE.min(crop.height),
-        })
         .collect()
 }
 
@@ -173,7 +166,11 @@ struct Time {
 }
 
 impl Meter<'_> {
-    fn render(&mut self, samples: Range<u64>) -> Result<Window> {
+    /// A window; none once it is time to stop.
+    fn render(&mut self, samples: Range<u64>) -> Result<Option<Window>> {
+        if self.stopped {
+            return Ok(None);
+        }
         struct Clock<'a> {
             last: Instant,
             go_on: &'a dyn Fn() -> bool,
@@ -197,7 +194,7 @@ impl Meter<'_> {
             reading: clock.last.elapsed().as_secs_f64(),
         });
         self.stopped |= !(self.go_on)();
-        Ok(window)
+        Ok((!self.stopped).then_some(window))
     }
 
     fn path_seconds(&self) -> Measured {
@@ -205,8 +202,12 @@ impl Meter<'_> {
         let (value, error) = mean_and_error(&each);
         Measured {
             value,
-            // Of one piece rather than of their mean: what disturbs lasts longer than a piece.
-            spread: (error / value * (each.len() as f64).sqrt()).max(DRIFT),
+            // Of one piece rather than of their mean: what disturbs lasts longer than a piece. One piece
+            // alone tells nothing of it.
+            spread: match each.len() {
+                1 => DRIFT,
+                n => (error / value * (n as f64).sqrt()).max(DRIFT),
+            },
         }
     }
 

@@ -42,8 +42,9 @@ fn variances(window: &Window) -> impl Iterator<Item = f64> {
 }
 
 impl Survey {
-    /// Joins windows of the whole image.
-    pub(super) fn new(crop: Rect, windows: &[Window]) -> Self {
+    /// Joins windows of the same pixels. `floor`: see [`floor`].
+    pub(super) fn new(windows: &[Window], floor: f64) -> Self {
+        let crop = windows[0].rect;
         let values = 3 * crop.pixels();
         let (mut sums, mut variance) = (vec![0.0; values], vec![0.0; values]);
         let mut samples = 0.0;
@@ -59,8 +60,6 @@ impl Survey {
                 *variance += v / windows.len() as f64;
             }
         }
-        let mean = sums.iter().sum::<f64>() / (samples * values as f64);
-        let floor = (0.1 * mean).powi(2);
         let mut survey = Self {
             crop,
             samples,
@@ -117,55 +116,78 @@ impl Survey {
         }
         part
     }
+}
 
-    /// The relative variance of a sample at each of `count` levels, of the whole image: the parts' own,
-    /// in proportion to what the survey has of them and of all (a ratio estimate: Cochran, "Sampling
-    /// Techniques", 1977, chapter 6). A sampler with one level shows it in its last window.
-    pub(super) fn pool(&self, parts: &[Part], count: usize) -> Vec<Measured> {
-        let shown = parts.first().map_or(0, |part| part.levels.len());
-        (shown - count..shown)
-            .map(|level| self.pool_level(parts, level))
-            .collect()
+/// Square of a tenth of the mean of the image, of which `window` has a few samples.
+pub(super) fn floor(window: &Window) -> f64 {
+    let samples = (window.samples.end - window.samples.start) as f64;
+    let sum: f64 = window.pixels.iter().flat_map(|p| p.sum).sum();
+    (0.1 * sum / (samples * 3.0 * window.pixels.len() as f64)).powi(2)
+}
+
+/// The relative variance of a sample at each of `count` levels, of an image of so many pixels: the parts'
+/// own, in proportion to what a survey has of them and of all (a ratio estimate: Cochran, "Sampling
+/// Techniques", 1977, chapter 6); without a survey, in proportion to their pixels. A sampler with one
+/// level shows it in its last window.
+pub(super) fn pool(
+    parts: &[Part],
+    survey: Option<&Survey>,
+    pixels: usize,
+    count: usize,
+) -> Vec<Measured> {
+    let shown = parts.first().map_or(0, |part| part.levels.len());
+    (shown - count..shown)
+        .map(|level| pool_level(parts, survey, pixels as f64, level))
+        .collect()
+}
+
+fn pool_level(parts: &[Part], survey: Option<&Survey>, pixels: f64, level: usize) -> Measured {
+    let sum = |of: &dyn Fn(&Part) -> f64| parts.iter().map(of).sum::<f64>();
+    let size = |part: &Part| survey.map_or(part.pixels, |_| part.survey);
+    let total = survey.map_or(pixels, |s| s.relative.iter().sum());
+    let all = sum(&|p| p.levels[level]);
+    let ratio = all / sum(&size);
+    let value = ratio * total / (3.0 * pixels);
+    if !(value > 0.0 && value.is_finite()) {
+        return Measured::default();
     }
-
-    /// By how much the bound on the error's square, by which a render stops, is above it: see
-    /// `Estimate::error_at_most`. A share of it.
-    pub(super) fn margin(&self) -> f64 {
-        let pixels = self.relative.len() as f64;
-        let sum: f64 = self.relative.iter().sum();
-        let squares: f64 = self.relative.iter().map(|x| x * x).sum();
-        let variance = (pixels * squares / (sum * sum) - 1.0).max(0.0) / pixels;
-        if sum > 0.0 {
-            UPPER * variance.sqrt()
-        } else {
-            0.0
-        }
+    // Of the batches: pixels are independent.
+    let noise = sum(&|p| p.squares[level]) / (all * all);
+    // Of the choice of parts.
+    let residual = sum(&|p| (p.levels[level] - ratio * size(p)).powi(2));
+    let unseen = (1.0 - sum(&|p| p.pixels) / pixels).max(0.0);
+    let n = parts.len() as f64;
+    let choice = if n > 1.0 {
+        unseen * residual * n / ((n - 1.0) * all * all)
+    } else {
+        0.0
+    };
+    Measured {
+        value,
+        spread: (noise + choice).sqrt(),
     }
+}
 
-    fn pool_level(&self, parts: &[Part], level: usize) -> Measured {
-        let sum = |of: &dyn Fn(&Part) -> f64| parts.iter().map(of).sum::<f64>();
-        let (all, seen) = (sum(&|p| p.levels[level]), sum(&|p| p.survey));
-        let values = self.relative.len() as f64;
-        let surveyed = self.relative.iter().sum::<f64>();
-        let ratio = all / seen;
-        let value = ratio * surveyed / (3.0 * values);
-        if !(value > 0.0 && value.is_finite()) {
-            return Measured::default();
-        }
-        // Of the batches: pixels are independent.
-        let noise = sum(&|p| p.squares[level]) / (all * all);
-        // Of the choice of parts.
-        let residual = sum(&|p| (p.levels[level] - ratio * p.survey).powi(2));
-        let unseen = (1.0 - sum(&|p| p.pixels) / values).max(0.0);
-        let n = parts.len() as f64;
-        let choice = if n > 1.0 {
-            unseen * residual * n / ((n - 1.0) * all * all)
-        } else {
-            0.0
-        };
-        Measured {
-            value,
-            spread: (noise + choice).sqrt(),
-        }
+/// By how much the bound on the error's square, by which a render stops, is above it: see
+/// `Estimate::error_at_most`. A share of it, from the survey or else from the parts' first levels.
+pub(super) fn margin(parts: &[Part], survey: Option<&Survey>, pixels: usize) -> f64 {
+    let part = |of: &dyn Fn(&Part) -> f64| parts.iter().map(of).sum::<f64>();
+    let (sum, squares, seen) = match survey {
+        Some(survey) => (
+            survey.relative.iter().sum::<f64>(),
+            survey.relative.iter().map(|x| x * x).sum::<f64>(),
+            pixels as f64,
+        ),
+        None => (
+            part(&|p| p.levels[0]),
+            part(&|p| p.squares[0]),
+            part(&|p| p.pixels),
+        ),
+    };
+    let variance = (seen * squares / (sum * sum) - 1.0).max(0.0) / pixels as f64;
+    if sum > 0.0 {
+        UPPER * variance.sqrt()
+    } else {
+        0.0
     }
 }

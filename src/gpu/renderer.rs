@@ -66,6 +66,8 @@ pub struct GpuRenderer {
     chosen: wgpu::Buffer,
     counters: wgpu::Buffer,
     aovs: Option<Aovs>,
+    /// Longest side of a region.
+    side: u32,
     region: RegionTargets,
     /// Kernel radiance per radiance.
     light: f64,
@@ -108,14 +110,14 @@ impl GpuRenderer {
     ) -> Result<Self> {
         let kernel = link(Stage::Path, scene, placement, effects)?;
         let device = &gpu.device;
-        let side = REGION.min(gpu.limits.max_texture_dimension_2d);
+        let (_, partial_size) = kernel
+            .struct_members("Partial")
+            .ok_or_else(|| Error::Shader("the kernel has no struct Partial".into()))?;
+        let side = region_side(&gpu.limits, partial_size);
         let (width, height) = (
             settings.crop.width.min(side),
             settings.crop.height.min(side),
         );
-        let (_, partial_size) = kernel
-            .struct_members("Partial")
-            .ok_or_else(|| Error::Shader("the kernel has no struct Partial".into()))?;
 
         let uniform = |label, contents: &[u8]| {
             device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
@@ -233,6 +235,7 @@ impl GpuRenderer {
             chosen,
             counters,
             aovs,
+            side,
             region,
             light: placement.light,
             rate: 1.0e6,
@@ -564,8 +567,7 @@ impl Renderer for GpuRenderer {
         if tiles.is_some() && !self.kernel.has_binding(15) {
             return Err(Error::Shader("the kernel renders all tiles or none".into()));
         }
-        let side = REGION.min(self.gpu.limits.max_texture_dimension_2d);
-        for (i, region) in self.crop.pieces(side).enumerate() {
+        for (i, region) in self.crop.pieces(self.side).enumerate() {
             // All pieces get the samples that the first one got.
             let wanted = window.samples.clone();
             let corner = [region.x - self.crop.x, region.y - self.crop.y];
@@ -641,6 +643,16 @@ impl RegionTargets {
         let textures: u64 = self.textures.iter().map(texels).sum();
         textures + self.staging.iter().map(wgpu::Buffer::size).sum::<u64>()
     }
+}
+
+/// Longest side of a region: a multiple of the tile's, such that one buffer can hold its partial sums.
+fn region_side(limits: &wgpu::Limits, partial_size: u32) -> u32 {
+    let bytes = limits
+        .max_storage_buffer_binding_size
+        .min(limits.max_buffer_size);
+    let pixels = (bytes / u64::from(partial_size)).isqrt();
+    let most = u64::from(REGION.min(limits.max_texture_dimension_2d)).min(pixels);
+    (most as u32 / TILE * TILE).max(TILE)
 }
 
 /// Bytes from a row of rgba32float texels to the next in a buffer.

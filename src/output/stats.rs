@@ -76,8 +76,9 @@ pub struct Stats {
     pub first_non_finite: Option<NonFinite>,
     /// What the limit on bounces cut off.
     pub bounce_limit: BounceLimit,
-    /// How much light each setting that is not exact took; empty if all are, or were without effect.
-    pub ledger: Vec<Entry>,
+    /// How much light each setting that is not exact took: empty if all are, or were without effect; `null`
+    /// if it could not be measured.
+    pub ledger: Option<Vec<Entry>>,
     /// What ended the render.
     pub stopped_by: StoppedBy,
     /// What the user was warned of, in order.
