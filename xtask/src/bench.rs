@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use crate::{cargo, program, run};
+use crate::{cargo, forecasts, program, run};
 
 const USAGE: &str = "\
 Usage: cargo xtask bench [TABLE...] [--quick]
@@ -12,6 +12,7 @@ Usage: cargo xtask bench [TABLE...] [--quick]
   unused     effects that a scene does not use
   offsets    ways to leave a surface: what each gets wrong, and costs
   geometry   spheres as constants or in a buffer
+  forecasts  what price says of five scenes, and what the renders then take (some minutes)
   resources  time to the first window, peak memory
   peers      Mitsuba 3 on the same scenes (installs it into target/peers with pip; needs LLVM 19,
              as of Debian's libllvm19, for its compiled variant; takes a quarter of an hour, with
@@ -20,17 +21,18 @@ Usage: cargo xtask bench [TABLE...] [--quick]
              (installs as peers does; writes docs/images/hazards.png; takes ten minutes)
   coverage   how often 95 % intervals hold the truth, over 200 seeds (half an hour)
 
-Without a name: all but peers, hazards and coverage. Run it on an idle machine.
+Without a name: all but forecasts, peers, hazards and coverage. Run it on an idle machine.
 ";
 
 /// Runs the benchmarks named in `tables`.
 pub(crate) fn all(tables: &[String]) -> Result<(), String> {
-    const KNOWN: [&str; 8] = [
+    const KNOWN: [&str; 9] = [
         "naive",
         "unused",
         "geometry",
         "offsets",
         "resources",
+        "forecasts",
         "peers",
         "hazards",
         "coverage",
@@ -62,6 +64,9 @@ pub(crate) fn all(tables: &[String]) -> Result<(), String> {
     }
     if chosen("resources") {
         resources()?;
+    }
+    if tables.iter().any(|t| t == "forecasts") {
+        forecasts::table()?;
     }
     if tables.iter().any(|t| t == "peers") {
         peers(quick)?;

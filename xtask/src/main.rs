@@ -2,6 +2,7 @@
 
 mod bench;
 mod drivers;
+mod forecasts;
 mod numerics;
 mod soak;
 mod test;
