@@ -9,6 +9,7 @@ use std::path::Path;
 use std::process::Command;
 
 use cli_support::{BLACK, Background, Folder, holds};
+use gpu_trace::input::read;
 use serde_json::{Value, json};
 
 /// Small enough for a second or two.
@@ -392,6 +393,138 @@ fn a_time_limit_ends_runs_at_a_doubling() {
         assert!(last < 1_000_000 && last.is_power_of_two(), "{last}");
         assert_eq!(run["complete"], json!(true));
     }
+}
+
+/// A study in `s`, of one series on the CPU if `arguments` do not say otherwise.
+fn small(folder: &Folder, arguments: &str) {
+    let run = folder.run(&format!(
+        "converge --spp 16 --reference-spp 1024 --samplers sobol --progress none {arguments}"
+    ));
+    assert_eq!(run.code, Some(0), "{arguments}: {run:?}");
+}
+
+/// The size of the reference in `s`, and what it says of its bounces.
+fn reference(folder: &Folder) -> ([u32; 2], String) {
+    let input = read(&folder.path("s/reference.exr")).expect("an image");
+    let size = [input.picture.width, input.picture.height];
+    (size, input.about["max_bounces"].clone())
+}
+
+/// A fresh study measures what one in a new directory does, whatever the old reference is of.
+#[test]
+fn a_fresh_study_has_its_own_reference() {
+    let folder = Folder::with_scene();
+    let all = "good.toml --backends cpu --integrators bsdf --seeds 1";
+    small(&folder, &format!("{all} --size 16x12 -o s"));
+    assert_eq!(reference(&folder), ([16, 12], "64".into()));
+    let more = format!("{all} --size 24x20 --max-bounces 200");
+    small(&folder, &format!("{more} --fresh -o s"));
+    assert_eq!(reference(&folder), ([24, 20], "200".into()));
+    small(&folder, &format!("{more} -o new"));
+    let [fresh, new] = ["s", "new"].map(|d| folder.json(&format!("{d}/converge.json")));
+    assert_eq!(errors(&fresh), errors(&new));
+}
+
+/// Whatever image lies where the reference should: it is rendered again, unless it is just that.
+#[test]
+fn a_reference_that_is_another_is_not_used() {
+    let folder = Folder::with_scene();
+    let all = "good.toml --backends cpu --integrators bsdf --size 16x12 -o s --seeds";
+    small(&folder, &format!("{all} 1"));
+    // Not the bytes: the order of attributes in a file is by chance.
+    let there = || read(&folder.path("s/reference.exr")).expect("an image");
+    let own = there();
+    let seed = u64::MAX;
+    let mut seeds = 1;
+    for options in [
+        "--size 24x20",
+        "--size 12x16",
+        "--max-bounces 1",
+        "--integrator bsdf",
+        "--sampler independent",
+        "--spp 512",
+        "--seed 5",
+        "--backend gpu",
+    ] {
+        // The last option of a name counts.
+        let mut words: Vec<String> = Vec::new();
+        let usual = format!(
+            "--size 16x12 --max-bounces 64 --sampler sobol --spp 1024 --seed {seed} --backend cpu"
+        );
+        let (name, _) = options.split_once(' ').expect("an option with a value");
+        for option in usual.split("--").skip(1).map(|o| format!("--{}", o.trim())) {
+            if !option.starts_with(&format!("{name} ")) {
+                words.push(option);
+            }
+        }
+        folder.ok(&format!(
+            "good.toml {} {options} -q -o s/reference.exr",
+            words.join(" ")
+        ));
+        assert!(there() != own, "{options}");
+        seeds += 1;
+        small(&folder, &format!("{all} {seeds}"));
+        assert!(there() == own, "{options}");
+    }
+    // The companion: what is just that is used.
+    let time = || fs::metadata(folder.path("s/reference.exr")).and_then(|data| data.modified());
+    let before = time().expect("a time");
+    small(&folder, &format!("{all} {}", seeds + 1));
+    assert_eq!(time().expect("a time"), before);
+}
+
+#[test]
+fn images_are_those_of_their_run() {
+    let folder = Folder::new();
+    let images = |options: &str| -> Vec<String> {
+        let all = "--study lecture --backends cpu --size 16x12 --seeds 2 -o s";
+        small(&folder, &format!("{all} {options}"));
+        let html = String::from_utf8(folder.read("s/report.html")).expect("text");
+        let sources = html.split("src=\"").skip(1);
+        sources
+            .map(|s| s.split('"').next().unwrap_or_default().to_owned())
+            .collect()
+    };
+    let first = images("--termination 0.2");
+    // After 1 sample and at the end, with their maps, and the reference.
+    assert_eq!(first.len(), 5);
+    for other in ["--termination 0.6", "--termination 0.2 --seed 1"] {
+        let others = images(other);
+        assert!(others[0] != first[0] && others[2] != first[2], "{other}");
+        assert!(images("--termination 0.2") == first, "{other}");
+    }
+}
+
+/// The pairs are those of a study in one go, whichever of the two was there first.
+#[test]
+fn a_series_that_joins_later_makes_its_pairs() {
+    let pairs = |stages: &[&str]| {
+        let folder = Folder::with_scene();
+        for backends in stages {
+            let all = "good.toml --integrators bsdf --size 16x12 --seeds 2 --reference-backend cpu";
+            small(&folder, &format!("{all} --backends {backends} -o s"));
+        }
+        folder.json("s/converge.json")["pairs"].clone()
+    };
+    let whole = pairs(&["gpu,cpu"]);
+    assert_eq!(whole[0]["levels"].as_array().map(Vec::len), Some(5));
+    assert_eq!(pairs(&["gpu", "gpu,cpu"]), whole);
+    assert_eq!(pairs(&["cpu", "gpu,cpu"]), whole);
+}
+
+/// Without a word on the reference it stays what it was.
+#[test]
+fn the_gpu_joins_a_study_of_the_cpu() {
+    let folder = Folder::with_scene();
+    let all = "good.toml --integrators bsdf --size 16x12 --seeds 1 -o s --backends";
+    small(&folder, &format!("{all} cpu"));
+    let own = folder.read("s/reference.exr");
+    small(&folder, &format!("{all} cpu,gpu"));
+    assert!(folder.read("s/reference.exr") == own);
+    let study = folder.json("s/converge.json");
+    assert_eq!(study["runs"].as_array().map(Vec::len), Some(2));
+    assert_eq!(study["study"]["reference"]["own"]["backend"], json!("cpu"));
+    assert!(study["study"]["gpu"].is_string());
 }
 
 /// The fields of a line of CSV, of which some are quoted.

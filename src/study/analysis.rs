@@ -312,27 +312,19 @@ impl Group<'_> {
 }
 
 impl Summary {
-    /// (seconds, relRMSE) of all levels at which the error is known.
+    /// (seconds, relRMSE) of all levels; the error is unknown where the reference's noise hides it.
     #[must_use]
-    pub fn over_time(&self) -> Vec<(f64, f64)> {
-        let point = |l: &Level| Some((l.seconds, l.error?));
-        self.levels.iter().filter_map(point).collect()
-    }
-
-    /// (samples, relRMSE), likewise.
-    #[must_use]
-    pub fn over_spp(&self) -> Vec<(f64, f64)> {
-        let point = |l: &Level| Some((l.spp as f64, l.error?));
-        self.levels.iter().filter_map(point).collect()
+    pub fn over_time(&self) -> Vec<(f64, Option<f64>)> {
+        self.levels.iter().map(|l| (l.seconds, l.error)).collect()
     }
 
     /// The samples a pixel that are done after `seconds`, setup and compilation included.
     #[must_use]
     pub fn spp_at(&self, seconds: f64) -> Option<f64> {
-        let curve: Vec<(f64, f64)> = self
+        let curve: Vec<(f64, Option<f64>)> = self
             .levels
             .iter()
-            .map(|l| (l.seconds, l.spp as f64))
+            .map(|l| (l.seconds, Some(l.spp as f64)))
             .collect();
         value_at(&curve, seconds)
     }

@@ -14,6 +14,10 @@ use crate::check::Random;
 /// Resamples.
 const RESAMPLES: usize = 1000;
 
+/// The share of them that must have a value: the others would be the extreme ones, and an interval of
+/// what is left too narrow.
+const VALUED: f64 = 0.9;
+
 /// The fewest runs with an interval.
 pub const FEWEST: usize = 4;
 
@@ -22,13 +26,13 @@ pub const FEWEST: usize = 4;
 pub struct Interval {
     /// Of all runs.
     pub value: f64,
-    /// Lower and upper end; `None` with fewer than 4 runs.
+    /// Lower and upper end; `None` with fewer than 4 runs, or where too many resamples have no value.
     pub range: Option<[f64; 2]>,
 }
 
 impl Interval {
     /// The interval of `statistic` over `count` runs, which it gets by their indices. `None` if it has
-    /// no value for all runs. Resamples without a value are left out.
+    /// no value for all runs; without ends if more than a tenth of the resamples have none.
     pub fn of(count: usize, statistic: impl Fn(&[usize]) -> Option<f64>) -> Option<Self> {
         let all: Vec<usize> = (0..count).collect();
         let value = statistic(&all).filter(|v| v.is_finite())?;
@@ -44,6 +48,9 @@ impl Interval {
             .filter_map(|_| statistic(&resample()))
             .filter(|v| v.is_finite())
             .collect();
+        if (values.len() as f64) < VALUED * RESAMPLES as f64 {
+            return Some(Self { value, range: None });
+        }
         values.sort_by(f64::total_cmp);
         let tail = tail(count);
         let range = [tail, 1.0 - tail].map(|q| quantile(&values, q));
@@ -145,6 +152,21 @@ mod tests {
         );
         assert!(Interval::of(4, first).is_some_and(|i| i.range.is_some()));
         assert_eq!(Interval::of(0, first), None);
+    }
+
+    /// A resample of 8 lacks a given run with probability (7/8)^8 = 0.34, and given four of them with
+    /// (1/2)^8 = 0.004.
+    #[test]
+    fn resamples_without_a_value_are_not_dropped_in_silence() {
+        let needs = |runs: std::ops::Range<usize>| {
+            let interval = Interval::of(8, |chosen| {
+                let any = chosen.iter().any(|i| runs.contains(i));
+                any.then(|| chosen.iter().sum::<usize>() as f64 / 8.0)
+            });
+            interval.expect("a value").range
+        };
+        assert_eq!(needs(0..1), None);
+        assert!(needs(0..4).is_some());
     }
 
     #[test]

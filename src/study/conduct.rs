@@ -1,16 +1,17 @@
 //! A study from its reference to its last run.
 
 use super::analysis::{Analysis, Subject, analyse};
+use super::identity::Identity;
 use super::measure::{Noise, Reference};
 use super::pictures::{equal_time_image, is_of_pair, sample_image};
+use super::reference::{ReferenceChoice, reference};
 use super::run::{Length, Observer, Run, advance, execute};
 use super::series::{Series, labels};
-use super::store::{Identity, REFERENCE, Store};
+use super::store::Store;
 use super::timetable::{Part, Timetable};
 use crate::error::{Error, Result};
 use crate::film::Film;
-use crate::input::{Input, read};
-use crate::output::{Contents, Format, Layer, Metadata, Picture, Snapshot};
+use crate::output::{Picture, Snapshot};
 use crate::render::Renderer;
 use crate::scene::Loaded;
 use crate::settings::Settings;
@@ -42,20 +43,29 @@ pub struct Study {
     pub identity: Identity,
 }
 
-/// What errors are measured against.
-#[derive(Debug)]
-pub enum ReferenceChoice {
-    /// An image from a file.
-    File(Box<Input>),
-    /// A long render.
-    Own {
-        /// How it is rendered.
-        series: Series,
-        /// Samples a pixel.
-        spp: u64,
-        /// No run has it.
-        seed: u64,
-    },
+impl Study {
+    /// Whether a run is done: it came to its end, and the images that it should keep are there.
+    #[must_use]
+    pub fn is_done(&self, store: &Store, index: usize, seed: u64) -> bool {
+        let series = self.subjects[index].series;
+        let key = series.key();
+        let has = |spp: u64| store.image(&sample_image(&series, seed, spp)).is_some();
+        let run = store
+            .runs
+            .iter()
+            .find(|r| r.seed == seed && r.series == key);
+        run.is_some_and(|run| {
+            let mut marks = run.points.iter().map(|p| p.spp);
+            run.complete && marks.all(|spp| !self.keeps(index, seed, spp) || has(spp))
+        })
+    }
+
+    /// Whether a run keeps its image of `spp` samples: those of the first seed are shown, and compared
+    /// with those of the same samples in f64.
+    fn keeps(&self, index: usize, seed: u64, spp: u64) -> bool {
+        seed == self.seeds.start
+            && (self.shown.contains(&spp) || is_of_pair(&self.subjects, &self.subjects[index]))
+    }
 }
 
 /// A renderer that is ready, and what that took.
@@ -103,12 +113,11 @@ pub struct Outcome {
 }
 
 /// What a run shows to the timetable and keeps in the store.
-struct Keeper<'a, 'b> {
-    timetable: &'a mut Timetable<'b>,
-    store: &'a Store,
-    slug: String,
-    /// Numbers of samples whose images are kept; `None` for all.
-    kept: Option<&'a [u64]>,
+pub(super) struct Keeper<'a, 'b> {
+    pub(super) timetable: &'a mut Timetable<'b>,
+    pub(super) store: &'a Store,
+    /// Index of the series and seed of a run; other renders keep nothing.
+    pub(super) run: Option<(&'a Study, usize, u64)>,
 }
 
 impl Observer for Keeper<'_, '_> {
@@ -118,9 +127,11 @@ impl Observer for Keeper<'_, '_> {
     }
 
     fn point(&mut self, spp: u64, film: &Film) -> Result<()> {
-        if self.kept.is_none_or(|kept| kept.contains(&spp)) {
-            self.store
-                .keep_image(&sample_image(&self.slug, spp), film)?;
+        if let Some((study, index, seed)) = self.run
+            && study.keeps(index, seed, spp)
+        {
+            let name = sample_image(&study.subjects[index].series, seed, spp);
+            self.store.keep_image(&name, film)?;
         }
         Ok(())
     }
@@ -131,23 +142,23 @@ impl Observer for Keeper<'_, '_> {
 /// # Errors
 /// If there is no reference for another reason. What fails later is in the outcome.
 pub fn conduct(study: &Study, store: &mut Store, host: &mut dyn Host) -> Result<Option<Outcome>> {
-    let key = |index: usize| study.subjects[index].series.key();
-    let is_done = |store: &Store, index: usize, seed: u64| {
-        let of = |r: &&Run| r.seed == seed && r.series == key(index);
-        store.runs.iter().find(of).is_some_and(|r| r.complete)
-    };
     // Series take turns: what disturbs the machine for a while disturbs all of them.
     let turns: Vec<(u64, usize)> = study
         .seeds
         .clone()
         .flat_map(|seed| (0..study.subjects.len()).map(move |i| (seed, i)))
         .collect();
+    let mut done: Vec<bool> = turns
+        .iter()
+        .map(|(seed, i)| study.is_done(store, *i, *seed))
+        .collect();
     let count = turns.len();
     let mut timetable = Timetable::new(host, study);
     timetable.pending = turns
         .iter()
-        .filter(|(seed, i)| !is_done(store, *i, *seed))
-        .map(|(_, series)| Part {
+        .zip(&done)
+        .filter(|(_, done)| !**done)
+        .map(|((_, series), _)| Part {
             series: *series,
             samples: study.length.spp,
         })
@@ -160,7 +171,7 @@ pub fn conduct(study: &Study, store: &mut Store, host: &mut dyn Host) -> Result<
 
     let mut failure = None;
     for (number, (seed, index)) in turns.into_iter().enumerate() {
-        if is_done(store, index, seed) {
+        if done[number] {
             continue;
         }
         if timetable.host.interrupted() {
@@ -175,9 +186,12 @@ pub fn conduct(study: &Study, store: &mut Store, host: &mut dyn Host) -> Result<
             &format!("run {}/{count}, {name}, seed {seed}", number + 1),
             part,
         );
-        if let Err(error) = run(study, store, &mut timetable, &reference, index, seed) {
-            failure = Some(error);
-            break;
+        match run(study, store, &mut timetable, &reference, index, seed) {
+            Ok(complete) => done[number] = complete,
+            Err(error) => {
+                failure = Some(error);
+                break;
+            }
         }
     }
     let noise = reference.noise();
@@ -188,10 +202,7 @@ pub fn conduct(study: &Study, store: &mut Store, host: &mut dyn Host) -> Result<
         .cloned()
         .collect();
     let analysis = analyse(&study.subjects, &mine, noise, reference.mean);
-    let complete = study
-        .seeds
-        .clone()
-        .all(|seed| (0..study.subjects.len()).all(|i| is_done(store, i, seed)));
+    let complete = done.iter().all(|done| *done);
     let mut equal_time = Vec::new();
     if complete && failure.is_none() {
         match images_at_equal_time(study, store, &mut timetable, &analysis) {
@@ -210,6 +221,7 @@ pub fn conduct(study: &Study, store: &mut Store, host: &mut dyn Host) -> Result<
     }))
 }
 
+/// A run; returns whether it came to its end.
 fn run(
     study: &Study,
     store: &mut Store,
@@ -217,22 +229,14 @@ fn run(
     reference: &Reference,
     index: usize,
     seed: u64,
-) -> Result<()> {
-    let subject = &study.subjects[index];
-    let series = subject.series;
+) -> Result<bool> {
+    let series = study.subjects[index].series;
     let settings = series.settings(&study.base, seed);
     let mut opened = timetable.host.open(&series, &settings)?;
-    // Its images are those of the first seed.
-    let kept: Option<&[u64]> = match seed == study.seeds.start {
-        true if is_of_pair(&study.subjects, subject) => None,
-        true => Some(&study.shown),
-        false => Some(&[]),
-    };
     let mut keeper = Keeper {
         timetable,
         store,
-        slug: series.slug(),
-        kept,
+        run: Some((study, index, seed)),
     };
     let (points, complete, film) = execute(
         opened.renderer.as_mut(),
@@ -251,89 +255,8 @@ fn run(
         compile: opened.compile,
         non_finite: film.tally().non_finite,
         points,
-    })
-}
-
-/// The reference: from its file, or from the study's directory, or rendered and put there.
-fn reference(study: &Study, store: &Store, timetable: &mut Timetable<'_>) -> Result<Option<Input>> {
-    let (series, spp, seed) = match &study.reference {
-        ReferenceChoice::File(input) => return Ok(Some(Input::clone(input))),
-        ReferenceChoice::Own { series, spp, seed } => (*series, *spp, *seed),
-    };
-    let path = store.path(REFERENCE);
-    let about = |name: &str, value: &str, input: &Input| {
-        input.about.get(name).is_some_and(|there| there == value)
-    };
-    // The directory's identity says that it is of this scene, and how it was rendered.
-    if let Ok(input) = read(&path)
-        && about("seed", &seed.to_string(), &input)
-        && about("spp", &spp.to_string(), &input)
-        && about("scene_hash", &study.loaded.hash, &input)
-        && about("backend", series.backend.name(), &input)
-    {
-        return Ok(Some(input));
-    }
-    let part = Part {
-        series: study.subjects.len(),
-        samples: spp,
-    };
-    timetable.pending.insert(0, part);
-    timetable.start("reference", part);
-    let settings = series.settings(&study.base, seed);
-    let mut opened = timetable.host.open(&series, &settings)?;
-    let mut film = Film::new(settings.crop);
-    let mut keeper = Keeper {
-        timetable,
-        store,
-        slug: String::new(),
-        kept: Some(&[]),
-    };
-    let (done, _) = advance(opened.renderer.as_mut(), &mut film, 0..spp, &mut keeper)?;
-    if !done {
-        return Ok(None);
-    }
-    let rect = film.rect();
-    let picture = Picture::new(rect.width, rect.height, film.pixels());
-    let errors = (0..rect.pixels()).map(|i| film.variance_of_mean(i));
-    let errors: Option<Vec<[f32; 3]>> = errors
-        .map(|v| v.map(|v| v.map(|v| v.sqrt() as f32)))
-        .collect();
-    let layers: Vec<Layer<'_>> = errors
-        .iter()
-        .map(|values| Layer {
-            name: "stderr",
-            channels: &["R", "G", "B"],
-            values: values.as_flattened(),
-        })
-        .collect();
-    let metadata = Metadata::new()
-        .with("version", env!("CARGO_PKG_VERSION"))
-        .with("scene", study.loaded.name.as_str())
-        .with("scene_hash", study.loaded.hash.as_str())
-        .with("seed", seed)
-        .with("spp", spp)
-        .with("integrator", series.integrator.name())
-        .with("sampler", series.sampler.name())
-        .with("max_bounces", series.max_bounces)
-        .with("backend", series.backend.name())
-        .with("device", opened.renderer.device().0);
-    let metadata = match film.freedom() {
-        Some(freedom) => metadata.with("degrees_of_freedom", freedom),
-        None => metadata,
-    };
-    let contents = Contents {
-        picture: &picture,
-        layers: &layers,
-        metadata: &metadata,
-        exposure: 0.0,
-    };
-    let bytes = contents.encode(Format::Exr).map_err(|source| Error::File {
-        action: "cannot write",
-        path: path.clone(),
-        source,
     })?;
-    store.write(REFERENCE, &bytes)?;
-    read(&path).map(Some)
+    Ok(complete)
 }
 
 /// Renders with each series just the samples that fit into the time that all of them have; none if it
@@ -355,7 +278,7 @@ fn images_at_equal_time(
             continue;
         };
         let spp = (spp as u64).max(1);
-        let name = equal_time_image(&subject.series.slug(), spp);
+        let name = equal_time_image(&subject.series, study.seeds.start, spp);
         wanted.push((index, spp, name));
     }
     let missing = |w: &&(usize, u64, String)| store.image(&w.2).is_none();
@@ -375,8 +298,7 @@ fn images_at_equal_time(
         let mut keeper = Keeper {
             timetable,
             store,
-            slug: String::new(),
-            kept: Some(&[]),
+            run: None,
         };
         let (done, _) = advance(opened.renderer.as_mut(), &mut film, 0..*spp, &mut keeper)?;
         if !done {

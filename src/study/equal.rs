@@ -10,10 +10,12 @@ use super::fit::{Reach, reaches, value_at};
 pub struct EqualError {
     /// relRMSE.
     pub error: f64,
-    /// Seconds; `null` where it was not reached.
+    /// Seconds; `null` where it was not reached, and where that is unknown.
     pub seconds: Vec<Option<f64>>,
     /// Whether the first point was below it already, so that the time is an upper bound.
     pub at_once: Vec<bool>,
+    /// Whether the reference's noise hides when it was reached, or if.
+    pub unknown: Vec<bool>,
 }
 
 /// Errors after one time, by series.
@@ -29,8 +31,8 @@ pub struct EqualTime {
 
 /// Times to round errors between the worst and the best that were reached.
 pub(super) fn equal_error(series: &[Summary]) -> Vec<EqualError> {
-    let curves: Vec<Vec<(f64, f64)>> = series.iter().map(Summary::over_time).collect();
-    let errors = || curves.iter().flatten().map(|p| p.1);
+    let curves: Vec<_> = series.iter().map(Summary::over_time).collect();
+    let errors = || curves.iter().flatten().filter_map(|p| p.1);
     let (best, worst) = (
         errors().fold(f64::MAX, f64::min),
         errors().fold(0.0, f64::max),
@@ -41,16 +43,20 @@ pub(super) fn equal_error(series: &[Summary]) -> Vec<EqualError> {
     // The small ones are what renders are for.
     targets.drain(..targets.len().saturating_sub(5));
     let times = |error: f64| {
-        let reached: Vec<Option<Reach>> = curves.iter().map(|c| reaches(c, error)).collect();
+        let reached: Vec<Reach> = curves.iter().map(|c| reaches(c, error)).collect();
         EqualError {
             error,
             at_once: reached
                 .iter()
-                .map(|r| matches!(r, Some(Reach::Before(_))))
+                .map(|r| matches!(r, Reach::Before(_)))
                 .collect(),
+            unknown: reached.iter().map(|r| *r == Reach::Unknown).collect(),
             seconds: reached
                 .into_iter()
-                .map(|r| r.map(|(Reach::Before(t) | Reach::At(t))| t))
+                .map(|r| match r {
+                    Reach::Before(t) | Reach::At(t) => Some(t),
+                    Reach::Unknown | Reach::Never => None,
+                })
                 .collect(),
         }
     };

@@ -5,11 +5,11 @@ use std::fmt::Write as _;
 use serde::Serialize;
 
 use super::analysis::Analysis;
+use super::identity::Identity;
 use super::measure::Noise;
 use super::pictures::Pair;
 use super::run::Run;
 use super::series::Key;
-use super::store::Identity;
 
 /// All of `converge.json`. The names are those of the JSON, which users' scripts rely on: add members,
 /// but rename and remove none.

@@ -43,21 +43,16 @@ pub fn bias_fit(sampler: Sampler, points: &[(u64, f64)], scale: &[f64]) -> Optio
         .filter(|(n, _, scale)| whole(sampler, *n) && *scale > 0.0)
         .collect();
     let last = points.iter().map(|p| p.0).max()?;
-    let lengths: Vec<u64> = match sampler {
-        Sampler::Independent => vec![4],
-        Sampler::Sobol => [4, 16, 64]
-            .into_iter()
-            .filter(|l| count(sampler, last, *l) > 0)
-            .collect(),
-    };
-    let unknowns = 1 + lengths.len();
+    // A variance for each length of scrambles that was come to.
+    let begun = sampler.levels().iter().filter(|from| **from < last);
+    let unknowns = 1 + begun.count();
     if points.len() <= unknowns {
         return None;
     }
     // Columns are divided by their size at the last point, which keeps the system well conditioned.
     let column = |n: u64, i: usize| match i {
         0 => 1.0,
-        i => count(sampler, n, lengths[i - 1]) as f64 / (n as f64 * n as f64),
+        i => count(sampler, n, i - 1) as f64 / (n as f64 * n as f64),
     };
     let sizes: Vec<f64> = (0..unknowns).map(|i| column(last, i)).collect();
     let mut matrix = vec![vec![0.0; unknowns + 1]; unknowns];
@@ -84,16 +79,11 @@ fn whole(sampler: Sampler, n: u64) -> bool {
     sampler == Sampler::Independent || n > 0 && n.is_multiple_of(sampler.batch(n - 1))
 }
 
-/// How many of the samples up to `n` are in scrambles of `length`; all samples are independent ones
-/// without scrambles.
-fn count(sampler: Sampler, n: u64, length: u64) -> u64 {
-    if sampler == Sampler::Independent {
-        return n;
-    }
-    // Lengths grow at these indices (`Sampler::batch`).
-    let bounds = [0, 64, 256, u64::MAX];
-    let lengths = bounds.windows(2).filter(|b| sampler.batch(b[0]) == length);
-    lengths.map(|b| n.min(b[1]).saturating_sub(b[0])).sum()
+/// How many of the samples up to `n` are in one of `Sampler::levels`.
+fn count(sampler: Sampler, n: u64, level: usize) -> u64 {
+    let levels = sampler.levels();
+    let end = levels.get(level + 1).copied().unwrap_or(u64::MAX);
+    n.min(end).saturating_sub(levels[level])
 }
 
 /// Solves a system whose last column is the right side, by elimination with pivots.
@@ -121,17 +111,6 @@ fn solve(mut rows: Vec<Vec<f64>>) -> Option<Vec<f64>> {
     solution.iter().all(|x| x.is_finite()).then_some(solution)
 }
 
-/// The x at which a falling curve first reaches `y`, on a line in the logarithms of its points.
-#[must_use]
-pub fn reaches(points: &[(f64, f64)], y: f64) -> Option<Reach> {
-    let first = points.first()?;
-    if first.1 <= y {
-        return Some(Reach::Before(first.0));
-    }
-    let pair = points.windows(2).find(|p| p[1].1 <= y && p[0].1 > y)?;
-    Some(Reach::At(between(pair, y, true)?))
-}
-
 /// Where a curve reaches a value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Reach {
@@ -139,19 +118,49 @@ pub enum Reach {
     Before(f64),
     /// Here.
     At(f64),
+    /// Not at the points before one that is unknown.
+    Unknown,
+    /// Not at all.
+    Never,
 }
 
-/// The y of a curve at `x`, on a line in the logarithms of its points; `None` outside of it.
+/// The x at which a falling curve first reaches `y`, on a line in the logarithms of its points. What is
+/// beyond a point whose y is unknown says nothing: y may have been reached there.
 #[must_use]
-pub fn value_at(points: &[(f64, f64)], x: f64) -> Option<f64> {
+pub fn reaches(points: &[(f64, Option<f64>)], y: f64) -> Reach {
+    let mut before: Option<(f64, f64)> = None;
+    for (x, value) in points {
+        let Some(value) = *value else {
+            return Reach::Unknown;
+        };
+        let point = (*x, value);
+        if value <= y {
+            let Some(before) = before else {
+                return Reach::Before(*x);
+            };
+            return between(&[before, point], y, true).map_or(Reach::Unknown, Reach::At);
+        }
+        before = Some(point);
+    }
+    Reach::Never
+}
+
+/// The y of a curve at `x`, on a line in the logarithms of its points; `None` outside of it, and beside
+/// a point whose y is unknown.
+#[must_use]
+pub fn value_at(points: &[(f64, Option<f64>)], x: f64) -> Option<f64> {
     if let Some(point) = points.iter().find(|p| p.0 == x) {
-        return Some(point.1);
+        return point.1;
     }
     let pair = points.windows(2).find(|p| p[0].0 <= x && x <= p[1].0)?;
-    between(pair, x, false)
+    between(
+        &[(pair[0].0, pair[0].1?), (pair[1].0, pair[1].1?)],
+        x,
+        false,
+    )
 }
 
-fn between(pair: &[(f64, f64)], at: f64, inverse: bool) -> Option<f64> {
+fn between(pair: &[(f64, f64); 2], at: f64, inverse: bool) -> Option<f64> {
     let turn = |(x, y): (f64, f64)| if inverse { (y, x) } else { (x, y) };
     let (a, b) = (turn(pair[0]), turn(pair[1]));
     if [a.0, a.1, b.0, b.1, at].iter().any(|v| *v <= 0.0) {
@@ -203,6 +212,9 @@ mod tests {
         let fit = bias_fit(Sampler::Sobol, &points, &scale).expect("a fit");
         assert!((fit.bias_squared - 0.001).abs() < 1.0e-10, "{fit:?}");
         assert!((fit.variance - long).abs() < 1.0e-6, "{fit:?}");
+        // As many samples as are in none of the longer scrambles: there is one variance to fit.
+        let few = bias_fit(Sampler::Sobol, &points[..7], &scale[..7]).expect("a fit");
+        assert!((few.variance - short).abs() < 1.0e-6, "{few:?}");
         // The plain law sees a bias that is none.
         let plain = bias_fit(Sampler::Independent, &points, &scale).expect("a fit");
         assert!((plain.bias_squared - 0.001).abs() > 1.0e-4, "{plain:?}");
@@ -268,16 +280,34 @@ mod tests {
 
     #[test]
     fn curves_are_read_between_their_points() {
-        let curve = [(1.0, 1.0), (4.0, 0.5), (16.0, 0.25)];
-        assert_eq!(reaches(&curve, 2.0), Some(Reach::Before(1.0)));
-        let Some(Reach::At(x)) = reaches(&curve, 0.5f64.sqrt()) else {
+        let curve = [(1.0, Some(1.0)), (4.0, Some(0.5)), (16.0, Some(0.25))];
+        assert_eq!(reaches(&curve, 2.0), Reach::Before(1.0));
+        let Reach::At(x) = reaches(&curve, 0.5f64.sqrt()) else {
             panic!("between the first two");
         };
         assert!((x - 2.0).abs() < 1.0e-12, "{x}");
-        assert_eq!(reaches(&curve, 0.2), None);
+        assert_eq!(reaches(&curve, 0.2), Reach::Never);
         assert!((value_at(&curve, 8.0).expect("inside") - 0.125f64.sqrt()).abs() < 1.0e-12);
         assert_eq!(value_at(&curve, 4.0), Some(0.5));
         assert_eq!(value_at(&curve, 17.0), None);
         assert_eq!(value_at(&curve, 0.5), None);
+    }
+
+    #[test]
+    fn nothing_is_read_beyond_what_is_unknown() {
+        let curve = [
+            (1.0, Some(1.0)),
+            (4.0, Some(0.5)),
+            (16.0, None),
+            (64.0, Some(0.2)),
+        ];
+        assert!(matches!(reaches(&curve, 0.6), Reach::At(_)));
+        assert_eq!(reaches(&curve, 0.4), Reach::Unknown);
+        assert_eq!(reaches(&curve, 0.1), Reach::Unknown);
+        assert!(value_at(&curve, 2.0).is_some());
+        for x in [5.0, 16.0, 20.0] {
+            assert_eq!(value_at(&curve, x), None);
+        }
+        assert_eq!(value_at(&curve, 64.0), Some(0.2));
     }
 }

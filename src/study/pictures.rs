@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::analysis::{Analysis, Subject};
-use super::series::labels;
+use super::series::{Series, labels};
 use super::store::Store;
 use crate::compare::{Errors, HeatMap};
 use crate::output::Picture;
@@ -44,16 +44,17 @@ pub struct PairLevel {
     pub mean: f64,
 }
 
-/// Names of the images that a run with the first seed keeps.
+/// Name of the image of a run after `spp` samples. All that decides the image within a directory is in
+/// the name: what was kept for another run is never taken for it.
 #[must_use]
-pub fn sample_image(slug: &str, spp: u64) -> String {
-    format!("{slug}-{spp}spp")
+pub fn sample_image(series: &Series, seed: u64, spp: u64) -> String {
+    format!("{}-seed{seed}-{spp}spp", series.slug())
 }
 
 /// Name of the image of `spp` samples, as many as fit into the time that all series have.
 #[must_use]
-pub fn equal_time_image(slug: &str, spp: u64) -> String {
-    format!("equal-time-{slug}-{spp}spp")
+pub fn equal_time_image(series: &Series, seed: u64, spp: u64) -> String {
+    format!("equal-time-{}", sample_image(series, seed, spp))
 }
 
 /// Whether images of a series are kept at all marks: it is one of a pair.
@@ -64,9 +65,9 @@ pub fn is_of_pair(subjects: &[Subject], subject: &Subject) -> bool {
     has(&|s| s.series == truth) && has(&|s| s.series.truth() == truth && s.series != truth)
 }
 
-/// All pairs with an image on either side.
+/// All pairs with an image of `seed` on either side.
 #[must_use]
-pub fn pairs(store: &Store, subjects: &[Subject], analysis: &Analysis) -> Vec<Pair> {
+pub fn pairs(store: &Store, subjects: &[Subject], seed: u64, analysis: &Analysis) -> Vec<Pair> {
     let all: Vec<_> = subjects.iter().map(|s| s.series).collect();
     let names = labels(&all);
     let mut pairs = Vec::new();
@@ -82,7 +83,7 @@ pub fn pairs(store: &Store, subjects: &[Subject], analysis: &Analysis) -> Vec<Pa
             last: None,
         };
         for level in summary.iter().flat_map(|s| &s.levels) {
-            let images = [series, truth].map(|s| sample_image(&s.slug(), level.spp));
+            let images = [series, truth].map(|s| sample_image(&s, seed, level.spp));
             let [Some(image), Some(exact)] = images.each_ref().map(|name| store.image(name)) else {
                 continue;
             };

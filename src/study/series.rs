@@ -89,20 +89,21 @@ impl Series {
         }
     }
 
-    /// A name that any file system takes.
+    /// A name that any file system takes, another for each series.
     #[must_use]
     pub fn slug(&self) -> String {
         let Key {
             integrator,
+            termination,
             sampler,
             backend,
             offset,
             max_bounces,
-            ..
         } = self.key();
+        let termination = termination.map_or_else(String::new, |p| format!("-{p:e}"));
         let offset = offset.replace([':', '+'], "");
         let backend = backend.name();
-        format!("{integrator}-{sampler}-{backend}-{offset}-{max_bounces}")
+        format!("{integrator}{termination}-{sampler}-{backend}-{offset}-{max_bounces}")
     }
 
     /// The same paths in f64 without any nudge: what rounding and nudges are told by.
@@ -236,13 +237,21 @@ mod tests {
             offset: Offset::Out(1.0e-4),
             ..all[0]
         };
-        let mut slugs: Vec<String> = all.iter().chain([&nudged]).map(Series::slug).collect();
+        let ended = Series {
+            integrator: Integrator::Lecture { termination: 0.5 },
+            ..all[2]
+        };
+        let mut slugs: Vec<String> = all
+            .iter()
+            .chain([&nudged, &ended])
+            .map(Series::slug)
+            .collect();
         assert!(
             slugs.iter().all(|s| !s.contains([':', '/', ' '])),
             "{slugs:?}"
         );
         slugs.sort();
         slugs.dedup();
-        assert_eq!(slugs.len(), 5);
+        assert_eq!(slugs.len(), 6);
     }
 }

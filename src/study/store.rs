@@ -7,69 +7,23 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use serde_json::Value;
 
+use super::identity::{Identity, ReferenceIdentity, differs, plain};
 use super::run::Run;
 use crate::error::{Error, Result};
 use crate::film::Film;
 use crate::output::{Picture, atomic, npy, read_npy};
 
-/// What all runs of a directory share: runs of another scene, size, length or reference, or of
-/// another version of the program, say nothing about these.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Identity {
-    /// The version of the program.
-    pub version: String,
-    /// The scene's name.
-    pub scene: String,
-    /// The scene's content.
-    pub scene_hash: String,
-    /// Columns and rows.
-    pub size: [u32; 2],
-    /// `--spp`
-    pub spp: u64,
-    /// `--time` in seconds.
-    pub time: Option<f64>,
-    /// What errors are measured against.
-    pub reference: ReferenceIdentity,
-    /// Threads of the CPU reference, 0 for one a core.
-    pub threads: usize,
-    /// The name of the GPU; `None` if the study uses none.
-    pub gpu: Option<String>,
-}
-
-/// Which image errors are measured against.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum ReferenceIdentity {
-    /// A file.
-    File {
-        /// As it was typed.
-        path: PathBuf,
-        /// FNV-1a of its bytes.
-        hash: String,
-    },
-    /// The study's own long render.
-    Own {
-        /// What rendered.
-        backend: String,
-        /// Name of the estimator.
-        integrator: String,
-        /// Samples a pixel.
-        spp: u64,
-        /// The seed, which no run has.
-        seed: u64,
-        /// The most scattering events.
-        max_bounces: u32,
-    },
-}
-
 /// An open directory.
 #[derive(Debug)]
 pub struct Store {
     directory: PathBuf,
-    /// Runs that were found and those added since; for a series and a seed the last one counts.
+    /// Of all images.
+    size: [u32; 2],
+    /// Runs that were found and those added since; for a series and a seed the last one counts that
+    /// came to its end, or the last one.
     pub runs: Vec<Run>,
 }
 
@@ -77,8 +31,18 @@ pub struct Store {
 pub const RUNS: &str = "runs.jsonl";
 /// The study's own reference.
 pub const REFERENCE: &str = "reference.exr";
+/// What is made of the runs at the end, in the order in which it is written.
+pub const FILES: [&str; 5] = [
+    "converge.csv",
+    "converge.json",
+    "error-time.svg",
+    "error-spp.svg",
+    "report.html",
+];
 /// The folder of images that the report is made of.
 const IMAGES: &str = "images";
+/// How the names of all of them end (`pictures::sample_image`).
+const IMAGE: &str = "spp.npy";
 
 impl Store {
     /// Opens a directory, which need not exist. Touches nothing if it is refused.
@@ -89,6 +53,7 @@ impl Store {
     pub fn open(directory: &Path, identity: &Identity, fresh: bool) -> Result<Self> {
         let store = Self {
             directory: directory.to_owned(),
+            size: identity.size,
             runs: Vec::new(),
         };
         let runs = store.path(RUNS);
@@ -123,10 +88,17 @@ impl Store {
     /// [`Error::File`]
     pub fn add(&mut self, run: Run) -> Result<()> {
         self.append(&json(&run))?;
-        self.runs
-            .retain(|r| (&r.series, r.seed) != (&run.series, run.seed));
-        self.runs.push(run);
+        self.count(run);
         Ok(())
+    }
+
+    fn count(&mut self, run: Run) {
+        let same = |r: &Run| (&r.series, r.seed) == (&run.series, run.seed);
+        // One that was done again for its images alone, and cut short, takes nothing away.
+        if run.complete || !self.runs.iter().any(|r| r.complete && same(r)) {
+            self.runs.retain(|r| !same(r));
+            self.runs.push(run);
+        }
     }
 
     /// Keeps the image of a film under a name.
@@ -139,10 +111,11 @@ impl Store {
         self.write(&image_path(name), &npy::encode(&picture))
     }
 
-    /// An image that was kept; `None` if there is none that can be read.
+    /// An image that was kept; `None` if there is none of the study's size that can be read.
     #[must_use]
     pub fn image(&self, name: &str) -> Option<Picture> {
-        read_npy(&self.path(&image_path(name))).ok()
+        let picture = read_npy(&self.path(&image_path(name))).ok()?;
+        ([picture.width, picture.height] == self.size).then_some(picture)
     }
 
     /// Refuses a directory that holds anything: `-o .` would strew files among others.
@@ -163,16 +136,53 @@ impl Store {
     }
 
     fn begin(self, identity: &Identity) -> Result<Self> {
-        let images = self.path(IMAGES);
-        let failed = |source| file("cannot write", &images, source);
-        // The images of an older study, which is given up.
-        match fs::remove_dir_all(&images) {
-            Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(failed(error)),
-            _ => {}
-        }
-        fs::create_dir_all(&images).map_err(failed)?;
+        self.give_up(identity)?;
+        self.make_images()?;
         self.write(RUNS, (json(identity) + "\n").as_bytes())?;
         Ok(self)
+    }
+
+    fn make_images(&self) -> Result<()> {
+        let images = self.path(IMAGES);
+        fs::create_dir_all(&images).map_err(|source| file("cannot write", &images, source))
+    }
+
+    /// Removes what an older study wrote, and nothing else.
+    fn give_up(&self, identity: &Identity) -> Result<()> {
+        let mut old: Vec<PathBuf> = FILES.iter().map(|name| self.path(name)).collect();
+        let reference = self.path(REFERENCE);
+        // It may be the very file that this study is to be measured against.
+        let is_given = match &identity.reference {
+            ReferenceIdentity::File { path, .. } => same_file(path, &reference),
+            ReferenceIdentity::Own { .. } => false,
+        };
+        if !is_given {
+            old.push(reference);
+        }
+        let images = self.path(IMAGES);
+        let unreadable = |source| file("cannot read", &images, source);
+        match fs::read_dir(&images) {
+            Ok(entries) => {
+                for entry in entries {
+                    let path = entry.map_err(unreadable)?.path();
+                    let name = path.file_name().unwrap_or_default();
+                    if name.to_string_lossy().ends_with(IMAGE) {
+                        old.push(path);
+                    }
+                }
+            }
+            Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+            Err(error) => return Err(unreadable(error)),
+        }
+        for path in old {
+            match fs::remove_file(&path) {
+                Err(error) if error.kind() != io::ErrorKind::NotFound => {
+                    return Err(file("cannot remove", &path, error));
+                }
+                _ => {}
+            }
+        }
+        Ok(())
     }
 
     fn resume(mut self, bytes: &[u8], identity: &Identity) -> Result<Self> {
@@ -186,11 +196,20 @@ impl Store {
         let whole = bytes.iter().rposition(|b| *b == b'\n').map_or(0, |i| i + 1);
         let text = str::from_utf8(&bytes[..whole]).map_err(|_| damaged(1))?;
         let mut lines = text.lines().enumerate();
-        let there: Value = lines
+        let mut there: Value = lines
             .next()
             .and_then(|(_, line)| serde_json::from_str(line).ok())
             .ok_or_else(|| damaged(1))?;
-        let here = serde_json::to_value(identity).map_err(|_| damaged(1))?;
+        let mut here = serde_json::to_value(identity).map_err(|_| damaged(1))?;
+        // Runs on a GPU can join those on the CPU, and the other way round; two GPUs differ.
+        let first_gpu = there.get("gpu").is_some_and(Value::is_null) && !here["gpu"].is_null();
+        match first_gpu {
+            true => there["gpu"] = here["gpu"].clone(),
+            false if here["gpu"].is_null() => {
+                here["gpu"] = there.get("gpu").cloned().unwrap_or_default();
+            }
+            false => {}
+        }
         if let Some(name) = differs(&there, &here) {
             let shown = |v: &Value| v.get(name).map_or("nothing".into(), plain);
             return Err(Error::Usage(format!(
@@ -203,14 +222,16 @@ impl Store {
         }
         for (index, line) in lines {
             let run: Run = serde_json::from_str(line).map_err(|_| damaged(index + 1))?;
-            self.runs
-                .retain(|r| (&r.series, r.seed) != (&run.series, run.seed));
-            self.runs.push(run);
+            self.count(run);
         }
-        if whole < bytes.len() {
+        let runs = text.split_once('\n').map_or("", |(_, runs)| runs);
+        if first_gpu {
+            self.write(RUNS, format!("{}\n{runs}", json(identity)).as_bytes())?;
+        } else if whole < bytes.len() {
             // What follows must not be joined to the torn line.
             self.write(RUNS, &bytes[..whole])?;
         }
+        self.make_images()?;
         Ok(self)
     }
 
@@ -240,29 +261,148 @@ fn json(value: &impl Serialize) -> String {
     serde_json::to_string(value).expect("names and finite numbers")
 }
 
-/// The first member in which two identities differ.
-fn differs<'a>(there: &Value, here: &'a Value) -> Option<&'a str> {
-    let members = here.as_object()?;
-    members
-        .iter()
-        .find(|(name, value)| there.get(name) != Some(value))
-        .map(|(name, _)| name.as_str())
+/// Whether two paths lead to one file that is there.
+fn same_file(a: &Path, b: &Path) -> bool {
+    let [a, b] = [a, b].map(|path| path.canonicalize().ok());
+    a.is_some() && a == b
 }
 
-/// A value without JSON's quotes, for messages.
-fn plain(value: &Value) -> String {
-    match value {
-        Value::String(text) => text.escape_debug().to_string(),
-        Value::Null => "none".into(),
-        other => other.to_string(),
+#[cfg(test)]
+mod tests {
+    use super::super::run::Point;
+    use super::super::series::{BackendKind, Key};
+    use super::*;
+
+    fn identity(reference: ReferenceIdentity) -> Identity {
+        Identity {
+            version: "1".into(),
+            scene: "glass".into(),
+            scene_hash: "0".into(),
+            size: [2, 1],
+            spp: 4,
+            time: None,
+            reference,
+            threads: 0,
+            gpu: None,
+        }
     }
-}
 
-/// FNV-1a of bytes, as 16 hexadecimal digits: against accidents, not against forgery.
-#[must_use]
-pub fn hash(bytes: &[u8]) -> String {
-    let hash = bytes.iter().fold(0xcbf2_9ce4_8422_2325_u64, |h, b| {
-        (h ^ u64::from(*b)).wrapping_mul(0x0100_0000_01b3)
-    });
-    format!("{hash:016x}")
+    fn own() -> ReferenceIdentity {
+        ReferenceIdentity::Own {
+            backend: "cpu".into(),
+            integrator: "bsdf".into(),
+            spp: 16,
+            seed: u64::MAX,
+            max_bounces: 64,
+        }
+    }
+
+    fn run(complete: bool, spp: u64) -> Run {
+        Run {
+            series: Key {
+                integrator: "bsdf".into(),
+                termination: None,
+                sampler: "sobol".into(),
+                backend: BackendKind::Cpu,
+                offset: "exact".into(),
+                max_bounces: 64,
+            },
+            seed: 0,
+            complete,
+            device: "CPU".into(),
+            setup: 0.0,
+            compile: 0.0,
+            non_finite: 0,
+            points: vec![Point {
+                spp,
+                seconds: 1.0,
+                mse: 1.0,
+                relmse: 1.0,
+                bias: 0.0,
+                estimated: None,
+            }],
+        }
+    }
+
+    #[test]
+    fn a_fresh_study_removes_what_studies_write_and_nothing_else() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let directory = folder.path().join("s");
+        let there = |name: &str| directory.join(name).exists();
+        Store::open(&directory, &identity(own()), false).expect("a new study");
+        let written = FILES
+            .iter()
+            .chain(&[REFERENCE, "images/bsdf-seed0-4spp.npy"]);
+        let others = ["notes.txt", "images/mine.npy", "images/old/a-4spp.npy"];
+        fs::create_dir(directory.join("images/old")).expect("a folder");
+        for name in written.clone().copied().chain(others) {
+            fs::write(directory.join(name), "old").expect("a file");
+        }
+        Store::open(&directory, &identity(own()), false).expect("the same study");
+        assert!(written.clone().all(|name| there(name)));
+
+        let given = ReferenceIdentity::File {
+            path: directory.join(REFERENCE),
+            hash: "0".into(),
+        };
+        Store::open(&directory, &identity(given), true).expect("a fresh study");
+        assert!(there(REFERENCE), "it is what errors are measured against");
+        Store::open(&directory, &identity(own()), true).expect("a fresh study");
+        assert!(!written.clone().any(|name| there(name)));
+        assert!(others.iter().all(|name| there(name)));
+    }
+
+    #[test]
+    fn a_run_that_is_cut_short_replaces_no_whole_one() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let open = || Store::open(folder.path(), &identity(own()), false).expect("a study");
+        let mut store = open();
+        for (run, counts) in [
+            (run(false, 1), (false, 1)),
+            (run(true, 2), (true, 2)),
+            (run(false, 3), (true, 2)),
+            (run(true, 4), (true, 4)),
+        ] {
+            store.add(run).expect("written");
+            for runs in [&store.runs, &open().runs] {
+                assert_eq!(runs.len(), 1);
+                assert_eq!((runs[0].complete, runs[0].points[0].spp), counts);
+            }
+        }
+    }
+
+    #[test]
+    fn a_gpu_joins_and_another_is_refused() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let open = |gpu: Option<&str>| {
+            let gpu = gpu.map(String::from);
+            let identity = Identity {
+                gpu,
+                ..identity(own())
+            };
+            Store::open(folder.path(), &identity, false).map(|store| store.runs.len())
+        };
+        let refused = |gpu| open(Some(gpu)).expect_err("another").to_string();
+        open(None).expect("a new study");
+        let mut store = Store::open(folder.path(), &identity(own()), false).expect("a study");
+        store.add(run(true, 4)).expect("written");
+        assert_eq!(open(Some("a")).expect("the first GPU"), 1);
+        assert!(refused("b").contains("another gpu: a there, b now"));
+        assert_eq!(open(None).expect("the CPU alone"), 1);
+        assert!(refused("b").contains("another gpu: a there, b now"));
+        assert_eq!(open(Some("a")).expect("the same"), 1);
+    }
+
+    #[test]
+    fn images_of_another_size_are_none() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let store = Store::open(folder.path(), &identity(own()), false).expect("a study");
+        for (width, is_there) in [(2, true), (3, false)] {
+            let picture = Picture::new(width, 1, vec![[1.0; 3]; width as usize]);
+            store
+                .write("images/a-4spp.npy", &npy::encode(&picture))
+                .expect("written");
+            assert_eq!(store.image("a-4spp").is_some(), is_there);
+        }
+    }
 }

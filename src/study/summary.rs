@@ -1,29 +1,21 @@
 //! What a study leaves: CSV, JSON, plots and the report.
 
 use super::analysis::{Level, Summary};
-use super::conduct::{Outcome, ReferenceChoice, Study};
+use super::conduct::{Outcome, Study};
 use super::export::{Document, csv};
 use super::pictures::{Pair, Shot, align, pairs, sample_image};
 use super::plot::{Axis, Curve, Plot};
+use super::reference::ReferenceChoice;
 use super::report::{Gallery, Report};
 use super::run::Run;
 use super::series::labels;
-use super::store::Store;
+use super::store::{FILES, Store};
 use super::tables;
 use crate::compare::HeatMap;
 use crate::error::{Error, Result};
 use crate::estimate::VarianceClass;
 use crate::output::Picture;
 use crate::output::numbers::{percent, significant};
-
-/// Names of the files, in the order in which they are written.
-pub const FILES: [&str; 5] = [
-    "converge.csv",
-    "converge.json",
-    "error-time.svg",
-    "error-spp.svg",
-    "report.html",
-];
 
 /// Writes all files of a study.
 ///
@@ -38,7 +30,7 @@ pub fn write(study: &Study, store: &Store, outcome: &Outcome, warnings: &[String
         .filter(|r| analysis.series.iter().any(|s| s.series == r.series))
         .cloned()
         .collect();
-    let pairs = pairs(store, &study.subjects, analysis);
+    let pairs = pairs(store, &study.subjects, study.seeds.start, analysis);
     let plots = [Axis::Seconds, Axis::Samples].map(|axis| plot(study, outcome, axis));
     let document = Document {
         command: &study.command,
@@ -336,7 +328,7 @@ fn shown(study: &Study, store: &Store, outcome: &Outcome) -> Gallery {
             .find(|s| s.series == series.key());
         for spp in &study.shown {
             let level = summary.and_then(|s| s.levels.iter().find(|l| l.spp == *spp));
-            let image = store.image(&sample_image(&series.slug(), *spp));
+            let image = store.image(&sample_image(series, study.seeds.start, *spp));
             let Some((level, picture)) = level.zip(image) else {
                 continue;
             };

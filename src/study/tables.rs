@@ -231,7 +231,8 @@ pub fn equal_error(analysis: &Analysis) -> Table {
     let mut table = Table::new(
         "Time to equal error",
         "Seconds until relRMSE is this small, on lines between the points, with setup and compilation; ≤ \
-         where the first point was below it already, > where the study ended first.",
+         where the first point was below it already, > where the study ended first, – from where on the \
+         reference's own noise hides the error.",
         &["series"],
     );
     table
@@ -240,6 +241,7 @@ pub fn equal_error(analysis: &Analysis) -> Table {
     let cell = |e: &EqualError, i: usize| match e.seconds[i] {
         Some(t) if e.at_once[i] => format!("≤ {}", seconds(t)),
         Some(t) => seconds(t),
+        None if e.unknown[i] => UNKNOWN.into(),
         None => {
             let end = analysis.series[i].levels.last().map_or(0.0, |l| l.seconds);
             format!("> {}", seconds(end))
@@ -333,4 +335,72 @@ pub fn seconds(time: f64) -> String {
 fn plain_percent(fraction: f64) -> String {
     let text = format!("{:.8}", 100.0 * fraction);
     format!("{} %", text.trim_end_matches('0').trim_end_matches('.'))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sampler::Sampler;
+    use crate::settings::{Integrator, Offset};
+    use crate::study::analysis::{Subject, analyse};
+    use crate::study::measure::Noise;
+    use crate::study::run::{Point, Run};
+    use crate::study::series::{BackendKind, Series};
+
+    /// The time to 20 %, by series, of runs with these relRMSEs at 1, 2, 4, ... samples.
+    fn times(errors: [&[f64]; 2], hidden: f64) -> [String; 2] {
+        let subjects = [1, 64].map(|max_bounces| Subject {
+            series: Series {
+                integrator: Integrator::Bsdf,
+                sampler: Sampler::Sobol,
+                backend: BackendKind::Cpu,
+                offset: Offset::Exact,
+                max_bounces,
+            },
+            variance: VarianceClass::Finite,
+        });
+        let point = |(i, error): (usize, &f64)| Point {
+            spp: 1 << i,
+            seconds: (1 << i) as f64,
+            mse: error * error,
+            relmse: error * error,
+            bias: 0.0,
+            estimated: None,
+        };
+        let runs: Vec<Run> = subjects
+            .iter()
+            .zip(errors)
+            .map(|(subject, errors)| Run {
+                series: subject.series.key(),
+                seed: 0,
+                complete: true,
+                device: String::new(),
+                setup: 0.0,
+                compile: 0.0,
+                non_finite: 0,
+                points: errors.iter().enumerate().map(point).collect(),
+            })
+            .collect();
+        let noise = Noise {
+            relmse_error: hidden * hidden / 2.0,
+            ..Noise::default()
+        };
+        let table = equal_error(&analyse(&subjects, &runs, Some(noise), 1.0));
+        let column = table.head.iter().position(|name| name == "20 %");
+        let column = column.unwrap_or_else(|| panic!("{:?}", table.head));
+        [0, 1].map(|i| table.rows[i][column].clone())
+    }
+
+    #[test]
+    fn what_the_reference_hides_is_not_said_to_be_missed() {
+        let other: &[f64] = &[0.4, 0.3, 0.11];
+        let [hidden, known] = times([&[0.4, 0.3, 0.08], other], 0.1);
+        assert_eq!(hidden, UNKNOWN);
+        assert!(known.starts_with(|c: char| c.is_ascii_digit()), "{known}");
+        // With a better reference it was reached, and if the series had ended there it was not.
+        let [reached, same] = times([&[0.4, 0.3, 0.08], other], 0.0);
+        assert!(reached < known && same == known, "{reached} {known}");
+        let [missed, _] = times([&[0.4, 0.3], other], 0.1);
+        assert_eq!(missed, format!("> {}", seconds(2.0)));
+    }
 }

@@ -26,11 +26,11 @@ Examples:
   gpu-trace converge glass --max-bounces 4,64 --reference long.exr
   gpu-trace converge --study cpu-gpu -o cpu-gpu
 
-A series is one combination of the lists, a run is a series with a seed. Errors are measured at 1, 2,
-4, ... samples a pixel; their time has setup and compilation in it, but neither the measuring nor the
-reference. The directory gets report.html, converge.csv, converge.json, error-time.svg, error-spp.svg, the
-reference, and runs.jsonl with every finished run: the same command, or one with more seeds or
-series, goes on from there."
+A series is one combination of the lists, a run is a series with a seed. Errors are measured at
+1, 2, 4, ... samples a pixel; their time has setup and compilation in it, but neither the measuring
+nor the reference. The directory gets report.html, converge.csv, converge.json, error-time.svg,
+error-spp.svg, the reference, and runs.jsonl with every finished run: the same command, or one with
+more seeds or series, goes on from there. What was cut short starts again: a run, or the reference."
 }
 
 /// The options of `converge`.
@@ -136,7 +136,7 @@ pub(in crate::cli) struct ConvergeArgs {
     /// Directory for report, plots, figures and runs [default: SCENE-converge, or SCENE-STUDY].
     #[arg(short, long, value_name = "DIR", help_heading = "Output")]
     pub(super) output: Option<PathBuf>,
-    /// Give up what the directory holds of an earlier study.
+    /// Remove what an earlier study wrote to the directory, its reference too, and start over.
     #[arg(long, help_heading = "Output")]
     pub(super) fresh: bool,
     /// Brighten the report's images by a factor of 2^EV.

@@ -41,7 +41,9 @@ pub(super) fn run(args: &ConvergeArgs) -> Result<()> {
     let outcome = conduct(study, &mut store, &mut machine);
     progress.finish();
     let Some(outcome) = outcome? else {
-        print("stopped before the reference was done; there is nothing to report yet\n")?;
+        print(
+            "stopped before the reference was done: there is nothing to report yet, and it will start again\n",
+        )?;
         return Err(Error::Interrupted(signals.code().unwrap_or(1)));
     };
     for notice in summary::notices(&outcome) {

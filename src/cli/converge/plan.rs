@@ -17,11 +17,13 @@ use crate::sampler::Sampler;
 use crate::scene::{Loaded, builtin};
 use crate::settings::{DEFAULT_TERMINATION, Integrator, Offset, Rect, Settings};
 use crate::study::analysis::Subject;
-use crate::study::conduct::{ReferenceChoice, Study};
+use crate::study::conduct::Study;
+use crate::study::identity::{Identity, ReferenceIdentity, hash};
 use crate::study::presets::{Preset, preset};
+use crate::study::reference::ReferenceChoice;
 use crate::study::run::Length;
 use crate::study::series::{BackendKind, Series, product};
-use crate::study::store::{Identity, ReferenceIdentity, Store, hash};
+use crate::study::store::Store;
 
 /// Longer side of an image where nobody says: errors are per pixel, and hardly depend on it.
 const SIDE: u32 = 160;
@@ -49,10 +51,12 @@ impl Plan {
 
     /// Runs that an earlier process has finished.
     pub(super) fn already_there(&self, store: &Store) -> usize {
-        let subjects = &self.study.subjects;
-        let mine = |key: &_| subjects.iter().any(|s| s.series.key() == *key);
-        let runs = store.runs.iter().filter(|r| r.complete && mine(&r.series));
-        runs.filter(|r| self.study.seeds.contains(&r.seed)).count()
+        let study = &self.study;
+        let done = |seed| {
+            let all = 0..study.subjects.len();
+            all.filter(|i| study.is_done(store, *i, seed)).count()
+        };
+        study.seeds.clone().map(done).sum()
     }
 }
 
@@ -89,6 +93,10 @@ pub(super) fn plan(args: &ConvergeArgs, warnings: &mut Vec<String>) -> Result<Pl
             variance: variance_class(&loaded.scene, &placement, &settings).class,
         });
     }
+    let directory = args.output.clone().unwrap_or_else(|| {
+        let what = preset.map_or("converge", |p| p.name);
+        PathBuf::from(format!("{}-{what}", loaded.name))
+    });
     let (reference, reference_identity) = match file {
         Some((input, hash)) => {
             warnings.extend(
@@ -103,7 +111,10 @@ pub(super) fn plan(args: &ConvergeArgs, warnings: &mut Vec<String>) -> Result<Pl
             };
             (ReferenceChoice::File(Box::new(input)), identity)
         }
-        None => own_reference(args, preset, &base, &subjects, spp, &backends),
+        None => {
+            let kind = reference_backend(args, preset, &backends, &directory);
+            own_reference(args, preset, &base, &subjects, spp, kind)
+        }
     };
     let rect = base.crop;
     let identity = Identity {
@@ -117,10 +128,6 @@ pub(super) fn plan(args: &ConvergeArgs, warnings: &mut Vec<String>) -> Result<Pl
         threads: args.threads.map_or(0, usize::from),
         gpu: backends.gpu,
     };
-    let directory = args.output.clone().unwrap_or_else(|| {
-        let what = preset.map_or("converge", |p| p.name);
-        PathBuf::from(format!("{}-{what}", loaded.name))
-    });
     let shown = preset.map_or(&[][..], |p| p.shown).iter().copied();
     Ok(Plan {
         study: Study {
@@ -277,6 +284,34 @@ fn or<T: Copy>(given: Vec<T>, preset: Option<&[T]>, default: T) -> Vec<T> {
     }
 }
 
+/// What renders the study's own reference, unless somebody says: what rendered the one that is there,
+/// so that a study can go on with the GPU where it began without.
+fn reference_backend(
+    args: &ConvergeArgs,
+    preset: Option<&Preset>,
+    backends: &Backends,
+    directory: &Path,
+) -> BackendKind {
+    match args.reference_backend {
+        Some(BackendArg::Cpu) => return BackendKind::Cpu,
+        Some(BackendArg::Gpu) => return BackendKind::Gpu,
+        Some(BackendArg::Auto) | None => {}
+    }
+    if let Some(kind) = preset.and_then(|p| p.reference) {
+        return kind;
+    }
+    let there = match args.fresh {
+        true => None,
+        false => ReferenceIdentity::backend_in(directory),
+    };
+    match there.as_deref() {
+        Some("cpu") => BackendKind::Cpu,
+        Some("gpu") => BackendKind::Gpu,
+        _ if backends.gpu.is_some() => BackendKind::Gpu,
+        _ => BackendKind::Cpu,
+    }
+}
+
 /// The study's own reference: the scene's usual estimator with the best sampler and the most bounces, so
 /// that a lower limit shows as the bias that it is.
 fn own_reference(
@@ -285,17 +320,8 @@ fn own_reference(
     base: &Settings,
     subjects: &[Subject],
     spp: u64,
-    backends: &Backends,
+    backend: BackendKind,
 ) -> (ReferenceChoice, ReferenceIdentity) {
-    let backend = match args.reference_backend {
-        Some(BackendArg::Cpu) => BackendKind::Cpu,
-        Some(BackendArg::Gpu) => BackendKind::Gpu,
-        _ => match preset.and_then(|p| p.reference) {
-            Some(kind) => kind,
-            None if backends.gpu.is_some() => BackendKind::Gpu,
-            None => BackendKind::Cpu,
-        },
-    };
     let bounces = subjects.iter().map(|s| s.series.max_bounces).max();
     let series = Series {
         integrator: base.integrator,
