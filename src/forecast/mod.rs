@@ -8,7 +8,7 @@ use crate::film::{LEAST_SAMPLES, WINDOW, next_look, window_end};
 use crate::sampler::Sampler;
 
 pub use pilot::run;
-pub(crate) use squares::squares;
+pub(crate) use squares::{spread, squares};
 
 /// Two-sided quantile of the normal distribution for intervals of 95 %.
 const Z: f64 = 1.96;

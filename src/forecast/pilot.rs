@@ -4,9 +4,9 @@
 use std::ops::Range;
 use std::time::{Duration, Instant};
 
-use super::squares;
 use super::survey::{Part, Survey, floor, margin, pool};
 use super::{Measured, Pilot};
+use super::{spread, squares};
 use crate::error::Result;
 use crate::estimate::Estimate;
 use crate::film::{BLOCK, Film, WINDOW, Window};
@@ -22,6 +22,9 @@ const PIECE: u64 = 12;
 const FIRST: u64 = 16;
 /// Pixels of an image that is always surveyed as a whole.
 const SMALL: usize = 1 << 16;
+/// The side of the squares that are timed, and how many there are.
+const TIMED_SIDE: u32 = 64;
+const TIMED: Range<f64> = 4.0..16.0;
 /// Timed windows, at least and at most, where windows of the whole image are short.
 const WINDOWS: Range<usize> = 3..8;
 /// The least relative spread of the time a path takes: between minutes, clocks and other processes
@@ -54,13 +57,15 @@ pub fn run(
         return Ok(None);
     };
     let floor = floor(&first);
-    let left = |meter: &Meter<'_>| {
+    // Of the first alone, which is slow: on the safe side.
+    let path_seconds = meter.seconds_per_path();
+    let left = |path_seconds: f64| {
         let seconds = budget.as_secs_f64() - begin.elapsed().as_secs_f64();
-        seconds / (meter.path_seconds().value * crop.pixels() as f64)
+        seconds / (path_seconds * crop.pixels() as f64)
     };
     let levels = settings.sampler.levels();
     let surveyed = (PIECES * PIECE) as f64;
-    let affordable = 0.5 * left(&meter) >= surveyed || crop.pixels() <= SMALL;
+    let affordable = 0.5 * left(path_seconds) >= surveyed || crop.pixels() <= SMALL;
     meter.times.clear();
     let mut whole = Vec::new();
     let rounds = if affordable { PIECES } else { 2 };
@@ -73,14 +78,18 @@ pub fn run(
         whole.push(window);
     }
     let survey = affordable.then(|| Survey::new(&whole, floor));
+    let path_seconds = meter.seconds_per_path();
+    let window_seconds = meter.window_seconds();
 
     // The batches of a long render.
-    let fast = affordable && left(&meter) >= (WINDOWS.start as u64 * WINDOW) as f64;
+    let fast = affordable && left(path_seconds) >= (WINDOWS.start as u64 * WINDOW) as f64;
     let ranges = ranges(levels, fast);
     let samples: u64 = ranges.iter().map(|r| r.end - r.start).sum();
     let apart = if affordable { 0.0 } else { surveyed };
-    let squares = squares(crop, left(&meter) / (samples as f64 + apart));
-    let timed = meter.times.len();
+    // A quarter is for the time.
+    let share =
+        left(path_seconds) - 0.25 * budget.as_secs_f64() / path_seconds / crop.pixels() as f64;
+    let squares = squares(crop, share / (samples as f64 + apart));
     let mut parts: Vec<Part> = Vec::new();
     for square in &squares {
         meter.renderer.show(*square);
@@ -102,11 +111,31 @@ pub fn run(
         });
     }
     meter.renderer.show(crop);
-    meter.times.truncate(timed);
-    if fast {
-        meter.times.clear();
+    let rays_per_path = whole.iter().map(|w| w.tally.rays as f64).sum::<f64>()
+        / whole
+            .iter()
+            .map(|w| (w.samples.end - w.samples.start) as f64)
+            .sum::<f64>()
+        / crop.pixels() as f64;
+    meter.times.clear();
+    if !fast {
+        // Short ranges take longer by the path: lanes wait for the last. So time is that of long ones, on
+        // squares; paths have not the same length everywhere, hence by the ray.
+        let paths = 0.25 * budget.as_secs_f64() / path_seconds;
+        let wanted = paths / f64::from(TIMED_SIDE * TIMED_SIDE) / WINDOW as f64;
+        let squares = spread(crop, TIMED_SIDE, wanted.clamp(TIMED.start, TIMED.end));
+        // Once more for the first: it may have to find the size of dispatches anew.
+        for square in squares.iter().take(1).chain(&squares) {
+            meter.renderer.show(*square);
+            if meter.render(WINDOW..2 * WINDOW)?.is_none() {
+                return Ok(None);
+            }
+        }
+        meter.times.remove(0);
+        meter.renderer.show(crop);
+    } else {
         while meter.times.len() < WINDOWS.start
-            || (meter.times.len() < WINDOWS.end && left(&meter) > 0.0)
+            || (meter.times.len() < WINDOWS.end && left(path_seconds) > 0.0)
         {
             if meter.render(WINDOW..2 * WINDOW)?.is_none() {
                 return Ok(None);
@@ -120,8 +149,8 @@ pub fn run(
         sampler: settings.sampler,
         variance: pool(&parts, survey.as_ref(), pixels, levels.len()),
         margin: margin(&parts, survey.as_ref(), pixels),
-        path_seconds: meter.path_seconds(),
-        window_seconds: meter.window_seconds() + judging(crop, &whole),
+        path_seconds: meter.path_seconds(rays_per_path),
+        window_seconds: window_seconds + judging(crop, &whole),
         seconds: begin.elapsed().as_secs_f64(),
     }))
 }
@@ -159,6 +188,7 @@ struct Meter<'a> {
 /// What a window took.
 struct Time {
     paths: f64,
+    rays: f64,
     /// Seconds until the last path was done.
     tracing: f64,
     /// Seconds from there to the end.
@@ -190,6 +220,7 @@ impl Meter<'_> {
         let samples = window.samples.end - window.samples.start;
         self.times.push(Time {
             paths: samples as f64 * window.pixels.len() as f64,
+            rays: window.tally.rays as f64,
             tracing: (clock.last - begin).as_secs_f64(),
             reading: clock.last.elapsed().as_secs_f64(),
         });
@@ -197,8 +228,15 @@ impl Meter<'_> {
         Ok((!self.stopped).then_some(window))
     }
 
-    fn path_seconds(&self) -> Measured {
-        let each: Vec<f64> = self.times.iter().map(|t| t.tracing / t.paths).collect();
+    fn seconds_per_path(&self) -> f64 {
+        let sum = |of: &dyn Fn(&Time) -> f64| self.times.iter().map(of).sum::<f64>();
+        sum(&|t| t.tracing) / sum(&|t| t.paths)
+    }
+
+    /// Seconds of a path of so many rays.
+    fn path_seconds(&self, rays: f64) -> Measured {
+        let each = self.times.iter().map(|t| rays * t.tracing / t.rays);
+        let each: Vec<f64> = each.collect();
         let (value, error) = mean_and_error(&each);
         Measured {
             value,
