@@ -30,7 +30,8 @@ pub struct Lights {
     places: Vec<Option<usize>>,
 }
 
-/// Lights up to which each is weighed at each vertex: measured, see `benches/RESULTS.md`.
+/// Lights up to which each is weighed at each vertex. A choice between 3, where it gains much, and 23, where
+/// it gains nothing (`benches/RESULTS.md`); where the gain ends was not measured.
 pub const MOST_WEIGHED: usize = 8;
 
 /// Whether light sampling finds this sphere from outside. Walls (with a pole frame) are left to BSDF
