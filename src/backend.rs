@@ -66,13 +66,13 @@ impl Backend {
     #[must_use]
     pub fn pixel_bytes(&self, settings: &Settings) -> usize {
         let image = match self {
-            // 48 each in film and window, and room for the files.
+            // 96 in the film, 48 in the window, and room for the files.
             Self::Gpu(_) => LEAST_PIXEL_BYTES,
             // The reference's sums in the middle of a window are larger.
             Self::Cpu { .. } => 2 * LEAST_PIXEL_BYTES,
         };
         // The pilot has a film of its own.
-        let pilot = if settings.adaptive { 48 } else { 0 };
+        let pilot = if settings.adaptive { 96 } else { 0 };
         // In film, window and renderer, and in the files.
         let aovs = if settings.has_aovs() {
             4 * size_of::<AovSums>()
@@ -84,7 +84,7 @@ impl Backend {
 }
 
 /// What a pixel takes on any device.
-pub const LEAST_PIXEL_BYTES: usize = 128;
+pub const LEAST_PIXEL_BYTES: usize = 176;
 
 /// Refuses an image that would end the program in the middle for want of memory.
 ///

@@ -15,7 +15,8 @@ pub struct Estimate {
     /// Mean over all pixels and channels, W/(sr m²).
     pub mean: f64,
     /// The relative error: sqrt of the mean over pixels and channels of s²/(m² + (0.1 M)²), with
-    /// the pixel's mean m and standard error s and the image's mean M. A fraction. `None` while
+    /// the pixel's mean m and standard error s and the image's mean M; without the bias of first order
+    /// that a ratio has ([`Film::relative_variance`]). A fraction. `None` while
     /// there are fewer than 16 batches of samples, and for a black image.
     pub error: Option<f64>,
     /// What the error is at most, with a confidence of 95 %, as far as its spread over the pixels tells;
@@ -35,14 +36,10 @@ impl Estimate {
         let values = (count * 3) as f64;
         let mean = (0..count).flat_map(|i| film.mean(i)).sum::<f64>() / values;
         let floor = (0.1 * mean).powi(2);
-        let squared = |i: usize| {
-            let (m, v) = (film.mean(i), film.variance_of_mean(i)?);
-            Some((0..3).map(|c| v[c] / (m[c] * m[c] + floor)).sum::<f64>() / 3.0)
-        };
         let mut sums = Some([0.0; 2]);
         for i in 0..count {
             sums = sums
-                .zip(squared(i))
+                .zip(film.relative_variance(i, floor))
                 .map(|([sum, squares], e)| [sum + e, squares + e * e]);
         }
         let known = |e: &f64| e.is_finite() && floor > 0.0;

@@ -12,17 +12,18 @@ use gpu_trace::settings::{Integrator, Rect, Settings};
 use study::{Truth, coverage, runs};
 
 /// Samples at which renders are looked at.
-const SAMPLES: [u64; 3] = [128, 512, 2048];
+const SAMPLES: [u64; 4] = [64, 128, 512, 2048];
 /// Another render's error at these is what renders stop at.
 const STOP: u64 = 768;
 
 /// Scene, size and estimator.
-const CASES: [(&str, u32, u32, Integrator); 5] = [
+const CASES: [(&str, u32, u32, Integrator); 6] = [
     ("lecture", 32, 32, Integrator::Bsdf),
     ("glass", 40, 32, Integrator::Bsdf),
     ("lecture-reflective", 32, 32, Integrator::Bsdf),
     ("field", 16, 9, Integrator::Bsdf),
     ("scenes/tests/lamps.toml", 40, 30, Integrator::Path),
+    ("scenes/tests/three-lamps.toml", 40, 30, Integrator::Path),
 ];
 
 fn main() {
