@@ -8,22 +8,22 @@ mod study;
 use gpu_trace::gpu::device::{self, DeviceChoice};
 use gpu_trace::sampler::Sampler;
 use gpu_trace::scene::builtin;
-use gpu_trace::settings::{Integrator, Rect, Settings};
+use gpu_trace::settings::{Rect, Settings};
 use study::{Truth, coverage, runs};
 
 /// Samples at which renders are looked at.
-const SAMPLES: [u64; 4] = [64, 128, 512, 2048];
+const SAMPLES: [u64; 3] = [128, 512, 2048];
 /// Another render's error at these is what renders stop at.
 const STOP: u64 = 768;
 
-/// Scene, size and estimator.
-const CASES: [(&str, u32, u32, Integrator); 6] = [
-    ("lecture", 32, 32, Integrator::Bsdf),
-    ("glass", 40, 32, Integrator::Bsdf),
-    ("lecture-reflective", 32, 32, Integrator::Bsdf),
-    ("field", 16, 9, Integrator::Bsdf),
-    ("scenes/tests/lamps.toml", 40, 30, Integrator::Path),
-    ("scenes/tests/three-lamps.toml", 40, 30, Integrator::Path),
+/// Scene and size.
+const CASES: [(&str, u32, u32); 6] = [
+    ("lecture", 32, 32),
+    ("glass", 40, 32),
+    ("lecture-reflective", 32, 32),
+    ("field", 16, 9),
+    ("scenes/tests/lamps.toml", 40, 30),
+    ("scenes/tests/three-lamps.toml", 40, 30),
 ];
 
 fn main() {
@@ -44,7 +44,7 @@ fn main() {
         "| scene | sampler | spp | normal | Student | ours | values below 90 %: Student | ours | \
          error | estimated/actual |\n|---|---|---|---|---|---|---|---|---|---|"
     );
-    for (scene_name, width, height, integrator) in CASES {
+    for (scene_name, width, height) in CASES {
         if !names.is_empty() && !names.iter().any(|n| scene_name.contains(n.as_str())) {
             continue;
         }
@@ -60,7 +60,6 @@ fn main() {
                     height,
                 },
                 sampler,
-                integrator,
                 ..Settings::for_scene(&loaded.scene)
             };
             runs(&gpu, &loaded.scene, &settings, seeds, &SAMPLES, STOP)
