@@ -16,7 +16,7 @@ pub trait Renderer {
     fn device(&self) -> (String, String, String);
 
     /// Renders the sample indices `samples` of every pixel of the crop, or fewer if `control` says
-    /// so; the window tells how many. The range lies in one window (`film::window_end`).
+    /// so, none if it may be given up; the window tells how many. The range lies in one window (`film::window_end`).
     ///
     /// # Errors
     /// If the device fails. The film keeps what it has.
@@ -47,6 +47,18 @@ pub trait Renderer {
 pub trait Control {
     /// Takes note that `paths` more paths are done; says whether to go on.
     fn proceed(&mut self, paths: u64) -> bool;
+
+    /// Whether there is time for `rest`: of a large image, rendered part by part, the others have to follow
+    /// where one went.
+    fn has_time(&self, _rest: Duration) -> bool {
+        true
+    }
+
+    /// Whether a window that has been stopped, but would take the rest of the image to be whole, may be
+    /// given up instead.
+    fn gives_up(&self) -> bool {
+        false
+    }
 }
 
 /// What ended a render: whichever came first.
@@ -108,6 +120,8 @@ struct Loop<'a> {
     begin: Instant,
     deadline: Option<Duration>,
     status: Status,
+    /// Whether there is an image without the window in progress.
+    kept: bool,
 }
 
 impl Control for Loop<'_> {
@@ -115,7 +129,15 @@ impl Control for Loop<'_> {
         self.status.paths += paths;
         self.status.elapsed = self.begin.elapsed();
         self.watch.update(&self.status);
-        !self.watch.interrupted() && self.deadline.is_none_or(|d| self.status.elapsed < d)
+        !self.watch.interrupted() && self.has_time(Duration::ZERO)
+    }
+
+    fn has_time(&self, rest: Duration) -> bool {
+        self.deadline.is_none_or(|d| self.status.elapsed + rest < d)
+    }
+
+    fn gives_up(&self) -> bool {
+        self.kept && self.watch.interrupted()
     }
 }
 
@@ -140,6 +162,7 @@ pub fn render(renderer: &mut dyn Renderer, settings: &Settings, watch: &mut dyn 
             begin: Instant::now(),
             deadline: settings.time,
             status,
+            kept: false,
         },
         failure: None,
     };
@@ -241,6 +264,7 @@ impl Run<'_> {
                 Ok(window) => {
                     start = window.samples.end - origin;
                     film.add_to(step, &window);
+                    self.control.kept |= film.samples() > 0;
                 }
                 Err(error) => {
                     self.failure = Some(error);

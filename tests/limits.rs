@@ -1,12 +1,18 @@
 //! Limits of drivers: llvmpipe, lavapipe's machine, ends every loop in silence after 65535 iterations
-//! of all loops of an invocation. Renders that need more take several dispatches, or fail loudly.
+//! of all loops of an invocation. Renders that need more take several dispatches, or fail loudly. And of
+//! textures: large images are rendered in parts.
 
 mod common;
+
+use std::cell::RefCell;
+use std::time::Duration;
 
 use common::{gpu_renderer, means, render_cpu, render_gpu, scene, settings};
 use gpu_trace::error::Error;
 use gpu_trace::film::Film;
-use gpu_trace::render::render_quietly;
+use gpu_trace::gpu::renderer::DispatchLimits;
+use gpu_trace::render::{Control, Renderer as _, Status, StoppedBy, Watch, render, render_quietly};
+use gpu_trace::settings::Settings;
 
 /// A closed furnace that keeps all light.
 const FURNACE: &str = "
@@ -96,5 +102,98 @@ fn a_path_longer_than_any_dispatch_is_an_error_or_right() {
         Ok(outcome) => assert_eq!(mean(&outcome.film), 65_536.0),
         Err(Error::Gpu(text)) => assert!(text.contains("--max-bounces"), "{text}"),
         Err(other) => panic!("{other}"),
+    }
+}
+
+/// Asks to stop after so many reports.
+struct Impatient {
+    left: u32,
+    /// Reports after that.
+    late: u32,
+}
+
+impl Watch for Impatient {
+    fn update(&mut self, _: &Status) {
+        self.late += u32::from(self.left == 0);
+        self.left = self.left.saturating_sub(1);
+    }
+
+    fn interrupted(&self) -> bool {
+        self.left == 0
+    }
+}
+
+/// Images beyond a region are rendered in parts, window by window: a signal does not wait for the rest of
+/// a window, unless there would be no image.
+#[test]
+fn large_images_stop_between_their_parts() {
+    let scene = scene(&cloud(8));
+    let settings = settings(&scene, 2100, 8, 256);
+    let limits = DispatchLimits {
+        tiles: 16,
+        samples: 16,
+    };
+    let renderer = || gpu_renderer(&scene, &settings).with_limits(limits);
+    // Of windows of 16 and 48 samples, the first takes 17 or 18 dispatches.
+    let mut samples = Vec::new();
+    for left in [1, 20, 30, 40] {
+        let mut watch = Impatient { left, late: 0 };
+        let outcome = render(&mut renderer(), &settings, &mut watch);
+        assert_eq!(outcome.stopped_by, StoppedBy::Interrupt);
+        let done = outcome.film.samples();
+        samples.push(done);
+        assert_eq!(watch.late == 0, left > 1, "{left}: {} late", watch.late);
+        let whole = render_gpu(
+            &scene,
+            &Settings {
+                samples: 0..done,
+                ..settings.clone()
+            },
+        );
+        assert_eq!(means(&outcome.film), means(&whole), "{left}");
+        assert_eq!(outcome.film.tally(), whole.tally(), "{left}");
+    }
+    assert_eq!(samples, [16; 4]);
+}
+
+/// Where one part of a large image goes, the others have to follow: there must be time for that.
+#[test]
+fn large_images_keep_to_the_time() {
+    /// Takes note of what it is asked.
+    struct Clock {
+        enough: bool,
+        asked: RefCell<Vec<Duration>>,
+    }
+    impl Control for Clock {
+        fn proceed(&mut self, _: u64) -> bool {
+            true
+        }
+        fn has_time(&self, rest: Duration) -> bool {
+            self.asked.borrow_mut().push(rest);
+            self.enough
+        }
+    }
+    let scene = scene(&cloud(8));
+    let settings = settings(&scene, 2100, 8, 256);
+    let limits = DispatchLimits {
+        tiles: 1 << 20,
+        samples: 4,
+    };
+    let mut renderer = gpu_renderer(&scene, &settings).with_limits(limits);
+    for (enough, end) in [(false, 4), (true, 16)] {
+        let mut clock = Clock {
+            enough,
+            asked: RefCell::default(),
+        };
+        let window = renderer.render(0..16, &mut clock).expect("a window");
+        assert_eq!(window.samples, 0..end);
+        let asked = clock.asked.borrow();
+        // Only of the first part, after every slab; the last one may have been all.
+        assert_eq!(asked.len() as u64, end / 4);
+        assert!(asked.iter().all(|rest| *rest > Duration::ZERO));
+        assert!(
+            window.pixels.iter().all(|p| p.sum[0] > 0.0),
+            "a part is missing"
+        );
     }
 }

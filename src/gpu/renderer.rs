@@ -333,16 +333,18 @@ impl GpuRenderer {
         ))
     }
 
-    /// Renders `samples` of `region`, or fewer if it may stop and `control` says so between two
-    /// slabs; returns the end that was reached.
+    /// Renders `samples` of `region`; returns the end that was reached. The first region of a window ends
+    /// early if `control` says so between two slabs, and `rest` is then how much larger the others are
+    /// together; they follow. Any of several is left if the window is given up.
     fn render_region(
         &mut self,
         region: Rect,
         samples: Range<u64>,
         chosen: Option<&ChosenTiles>,
-        may_stop: bool,
+        rest: Option<f64>,
         control: &mut dyn Control,
     ) -> Result<u64> {
+        let begin = Instant::now();
         let tiles = region.width.div_ceil(TILE) * region.height.div_ceil(TILE);
         let is_chosen = |tile: &u32| chosen.is_none_or(|c| c.has(*tile));
         let all = (0..tiles).filter(is_chosen).count() as u32;
@@ -359,7 +361,9 @@ impl GpuRenderer {
         };
         let mut start = samples.start;
         while start < samples.end {
-            let end = self.slab_end(start..samples.end, pixels.max(1.0));
+            // The others will take slabs of this length, too.
+            let all_pixels = pixels.max(1.0) * (1.0 + rest.unwrap_or(0.0));
+            let end = self.slab_end(start..samples.end, all_pixels);
             record.fresh = u32::from(start == samples.start);
             record.end_sample = end as u32;
             let mut proceed = true;
@@ -382,9 +386,13 @@ impl GpuRenderer {
                 let share = f64::from(count) / f64::from(all);
                 let done = share * pixels * (end - start) as f64;
                 proceed &= control.proceed(done as u64);
+                if !proceed && rest != Some(0.0) && control.gives_up() {
+                    return Ok(samples.start);
+                }
             }
             start = end;
-            if may_stop && !proceed {
+            let in_time = |rest| control.has_time(begin.elapsed().mul_f64(rest));
+            if rest.is_some_and(|rest| !proceed || !in_time(rest)) {
                 break;
             }
         }
@@ -568,7 +576,7 @@ impl Renderer for GpuRenderer {
             return Err(Error::Shader("the kernel renders all tiles or none".into()));
         }
         for (i, region) in self.crop.pieces(self.side).enumerate() {
-            // All pieces get the samples that the first one got.
+            // All regions get the samples that the first one got.
             let wanted = window.samples.clone();
             let corner = [region.x - self.crop.x, region.y - self.crop.y];
             let chosen = tiles.map(|tiles| ChosenTiles::of(tiles, corner, region));
@@ -578,7 +586,16 @@ impl Renderer for GpuRenderer {
                 self.gpu.queue.write_buffer(&self.chosen, 0, bytes);
             }
             let chosen = chosen.as_ref();
-            window.samples.end = self.render_region(region, wanted, chosen, i == 0, control)?;
+            let rest = self.crop.pixels() as f64 / region.pixels() as f64 - 1.0;
+            let rest = (i == 0).then_some(rest);
+            window.samples.end = self.render_region(region, wanted, chosen, rest, control)?;
+            if window.samples.is_empty() {
+                // None of the regions has any.
+                window.pixels.fill(PixelSums::default());
+                window.aovs.fill(AovSums::default());
+                window.tally = Tally::default();
+                break;
+            }
             let (pixels, tally) = self.read(region, &window.samples, chosen)?;
             let aovs = self.read_aovs(region, chosen)?;
             window.tally.add(&tally);
