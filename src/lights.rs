@@ -13,7 +13,7 @@ pub struct Light {
     pub sphere: usize,
     /// Luminance of its radiance.
     pub luminance: f64,
-    /// Of being drawn from the table: its share of the power of all.
+    /// Of being drawn from the table: its share of the power of all, huge lamps cut to the picture's size.
     pub probability: f64,
     /// In the alias table: the entry is this light below the threshold, else `alias`.
     pub threshold: f64,
@@ -34,15 +34,15 @@ pub struct Lights {
 /// it gains nothing (`benches/RESULTS.md`); where the gain ends was not measured.
 pub const MOST_WEIGHED: usize = 8;
 
-/// Whether light sampling finds this sphere from outside. Walls (with a pole frame) are left to BSDF
-/// sampling: they fill so much of the view that it finds them as well, and nothing is gained by
-/// directions that the rest of the scene mostly hides. So are lamps that only glass can see.
+/// Radius of a lamp, in kernel units, from which on it counts as no stronger in the table: the picture is
+/// about as large, and what is beyond sends nothing into it.
+const LARGEST: f64 = 1.0;
+
+/// Whether light sampling finds this sphere from outside. Lamps that only glass can see are left to BSDF
+/// sampling.
 fn is_sampled(scene: &Scene, sphere: &PlacedSphere) -> bool {
     let emission = scene.materials[sphere.material].emission;
-    sphere.pole.is_none()
-        && sphere.side != Side::Inside
-        && luminance(emission) > 0.0
-        && !is_sealed(scene, sphere.source)
+    sphere.side != Side::Inside && luminance(emission) > 0.0 && !is_sealed(scene, sphere.source)
 }
 
 /// Whether a dielectric is all around `scene.spheres[lamp]`, and nothing in it scatters light but in
@@ -89,7 +89,7 @@ impl Lights {
         let spheres = placement.spheres.iter().enumerate();
         let chosen: Vec<(usize, f64)> = spheres
             .filter(|(_, s)| is_sampled(scene, s))
-            .map(|(i, s)| (i, s.radius * s.radius * emitted(i)))
+            .map(|(i, s)| (i, s.radius.min(LARGEST).powi(2) * emitted(i)))
             .collect();
         let total: f64 = chosen.iter().map(|(_, power)| power).sum();
         if chosen.is_empty() || !(total > 0.0 && total.is_finite()) {

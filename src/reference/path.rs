@@ -11,6 +11,7 @@ use super::bsdf::sample::bsdf_sample;
 use super::bsdf::scatter::scatter;
 use super::core::random::{random4, sample_key};
 use super::core::sobol::sobol4;
+use super::light::aim::aim_at;
 use super::light::environment_radiance;
 use super::light::sphere::{light_density, power_weight, sample_light};
 use super::scene::camera::camera_ray;
@@ -188,13 +189,14 @@ impl PathTracer<'_> {
     fn emission_share(&self, ray: &Ray, hit: &Hit, density: f64, reach: f64) -> f64 {
         let lights = &self.placement.lights;
         let light = lights.of_sphere(hit.index);
-        let Some(light) = light.filter(|_| self.samples_lights() && density > 0.0) else {
+        let rivals = self.samples_lights() && density > 0.0 && !hit.inside;
+        let Some(light) = light.filter(|_| rivals) else {
             return 1.0;
         };
         let sphere = &self.placement.spheres[hit.index];
-        let w = (sphere.anchor - ray.anchor) - ray.offset;
+        let aim = aim_at(sphere, ray.anchor, ray.offset);
         let reach = (!lights.from_table(self.settings.light_sampling)).then_some(reach);
-        let other = light_density(light, w, sphere.radius, reach);
+        let other = light_density(light, &aim, reach);
         match self.settings.integrator {
             Integrator::Path => power_weight(density, other),
             _ if other > 0.0 => 0.0,
@@ -225,10 +227,15 @@ impl PathTracer<'_> {
         }
         let direction = bsdf_sample(s.direction, DVec3::ONE);
         let shadow = leave(ray.clone(), hit, vertex, &direction, self.placement.offset);
-        // A ray that misses the limb by a rounding has seen the light all the same.
-        let limb = s.w.dot(s.direction);
-        let hidden = closest_hit(&shadow, spheres)
-            .is_some_and(|first| first.index != s.sphere && first.t < limb);
+        // A ray that misses the limb by a rounding has seen the light all the same; lights are sampled
+        // from outside.
+        let hidden = closest_hit(&shadow, spheres).is_some_and(|first| {
+            if first.index == s.sphere {
+                first.inside
+            } else {
+                first.t < s.limb
+            }
+        });
         found.rays = 1;
         if hidden {
             return found;
