@@ -49,6 +49,7 @@ pub fn segment_point(area: f64) -> DVec2 {
 pub struct Cap {
     pub aim: Aim,
     pub cosine: f64,
+    pub tilt: DVec3,
     pub horizon: DVec2,
     pub segment: f64,
     pub ellipse: f64,
@@ -60,19 +61,26 @@ pub struct Cap {
 #[must_use]
 pub fn cap_seen(aim: &Aim, normal: DVec3) -> Cap {
     let (c, s, rim) = (normal.dot(aim.axis), aim.sine, aim.rim);
-    let across = ((s - c) * (s + c)).max(0.0);
+    let tilt = aim.axis - c * normal;
+    let meet = if rim < s {
+        tilt.length_squared() - rim * rim
+    } else {
+        (s - c) * (s + c)
+    };
+    let across = meet.max(0.0);
     let horizon = DVec2::new(rim, across.sqrt()) / (across + rim * rim).max(1.0e-300).sqrt();
-    let (segment, ellipse) = if c >= s {
+    let (segment, ellipse) = if c > 0.0 && meet <= 0.0 {
         (0.0, PI)
     } else {
         let meeting = DVec2::new(-c * horizon.x, horizon.y) / s;
         (segment_area(horizon), segment_area(meeting))
     };
     let area = (segment + s * s * c * ellipse).max(1.0e-6 * segment);
-    let seen = c > -s && aim.outside;
+    let seen = (c > 0.0 || meet > 0.0) && aim.outside;
     Cap {
         aim: *aim,
         cosine: c,
+        tilt,
         horizon,
         segment,
         ellipse,
@@ -93,8 +101,7 @@ pub fn sample_cap(cap: &Cap, normal: DVec3, u: DVec2) -> (DVec3, f64) {
         0.0
     };
     let basis = basis_around(normal);
-    let axis = cap.aim.axis;
-    let tilt = DVec2::new(axis.dot(basis.tangent), axis.dot(basis.bitangent));
+    let tilt = DVec2::new(cap.tilt.dot(basis.tangent), cap.tilt.dot(basis.bitangent));
     let along = tilt.try_normalize().unwrap_or(DVec2::X);
     let sin_t = tilt.length();
     let g = sin_t * cap.aim.rim;
