@@ -13,7 +13,7 @@ pub struct Light {
     pub sphere: usize,
     /// Luminance of its radiance.
     pub luminance: f64,
-    /// Of being drawn from the table: its share of the power of all, huge lamps cut to the picture's size.
+    /// Of being drawn from the table: its share of the power of all, of walls what is near the picture.
     pub probability: f64,
     /// In the alias table: the entry is this light below the threshold, else `alias`.
     pub threshold: f64,
@@ -33,10 +33,6 @@ pub struct Lights {
 /// Lights up to which each is weighed at each vertex. A choice between 3, where it gains much, and 23, where
 /// it gains nothing (`benches/RESULTS.md`); where the gain ends was not measured.
 pub const MOST_WEIGHED: usize = 8;
-
-/// Radius of a lamp, in kernel units, from which on it counts as no stronger in the table: the picture is
-/// about as large, and what is beyond sends nothing into it.
-const LARGEST: f64 = 1.0;
 
 /// Whether light sampling finds this sphere from outside. Lamps that only glass can see are left to BSDF
 /// sampling.
@@ -74,6 +70,16 @@ fn is_sealed(scene: &Scene, lamp: usize) -> bool {
     })
 }
 
+/// How far the spheres without a pole frame reach. A wall sends no more than a lamp of this radius at this
+/// distance would; what is beyond sends nothing into the picture.
+fn extent(placement: &Placement) -> f64 {
+    let centered = placement.spheres.iter().filter(|s| s.pole.is_none());
+    let reach = centered.map(|s| s.anchor.length() + s.radius);
+    let farthest = reach.fold(0.0, f64::max);
+    // Of walls alone none is larger than another.
+    if farthest > 0.0 { farthest } else { 1.0 }
+}
+
 impl Lights {
     /// The lights of `scene`; none if the lens straddles a lamp: what is sampled and what is not must
     /// be known when a ray hits it.
@@ -86,10 +92,15 @@ impl Lights {
             return Self::default();
         }
         let emitted = |i: usize| luminance(scene.materials[placement.spheres[i].material].emission);
+        let picture = extent(placement);
+        let size = |s: &PlacedSphere| match s.pole {
+            Some(_) => s.radius.min(picture),
+            None => s.radius,
+        };
         let spheres = placement.spheres.iter().enumerate();
         let chosen: Vec<(usize, f64)> = spheres
             .filter(|(_, s)| is_sampled(scene, s))
-            .map(|(i, s)| (i, s.radius.min(LARGEST).powi(2) * emitted(i)))
+            .map(|(i, s)| (i, size(s).powi(2) * emitted(i)))
             .collect();
         let total: f64 = chosen.iter().map(|(_, power)| power).sum();
         if chosen.is_empty() || !(total > 0.0 && total.is_finite()) {

@@ -232,7 +232,7 @@ fn close_lamps(more: usize) -> Scene {
     scene(&text)
 }
 
-/// A room with walls that emit, about their poles: a ceiling, a dimmer wall of radius 1e5, behind a row of
+/// A room with walls that emit, about their poles: a ceiling, a dimmer wall of radius 1e8, behind a row of
 /// balls; a ball that nearly touches the ceiling, a reflective and a mirror one, and lamps about their
 /// centres, one of them half in the ceiling.
 fn walls(more: usize) -> Scene {
@@ -252,7 +252,7 @@ fn walls(more: usize) -> Scene {
     };
     sphere([0.0, -1000.0, 0.0], 1000.0, "gray");
     sphere([0.0, 1002.5, 0.0], 1000.0, "ceiling");
-    sphere([-100_002.0, 0.0, 0.0], 1.0e5, "wall");
+    sphere([-1.0e8 - 2.0, 0.0, 0.0], 1.0e8, "wall");
     sphere([1002.0, 0.0, 0.0], 1000.0, "gray");
     sphere([0.0, 0.0, -10_002.0], 1.0e4, "gray");
     sphere([0.3, 2.199, 0.0], 0.3, "gray");
@@ -295,6 +295,7 @@ fn both_backends_sample_the_same_lights() {
         close_lamps(MOST_WEIGHED),
         walls(0),
         walls(MOST_WEIGHED),
+        glowing_glass(),
     ] {
         for (integrator, light_sampling) in SAMPLED {
             let settings = Settings {

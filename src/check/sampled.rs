@@ -155,7 +155,7 @@ pub(super) fn far(context: &Context) -> Result<Measure> {
     ) in lamps.iter().zip(found)
     {
         let place = || format!("a light at {}, normal {}", -lamp.x, lamp.normal);
-        // WGSL 15.7.4: two products, two sums, two divisions, a root.
+        // WGSL 15.7.4: an inverse root, twice, products, sums, a division, a root.
         let truth = cone_height(&lamp.aim()) * context.disturbed(1.0e-3);
         measure.add((height / truth - 1.0).abs() / (16.0 * ULP), place);
         // The cosine and the distance have some roundings, and what follows some more.

@@ -456,3 +456,40 @@ impl Renderer for ReferenceRenderer {
         0
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::load::load_str;
+
+    #[test]
+    fn a_lamp_that_is_hit_from_within_keeps_its_emission() {
+        let text = "[camera]\nposition = [0, 0, 4]\nlook_at = [0, 0, 0]\nfov = 40.0\n[image]\nwidth = 8\n\
+                    height = 8\n[material.lamp]\ntype = \"dielectric\"\nior = 1.5\nemission = [1, 1, 1]\n\
+                    [[sphere]]\ncenter = [0, 0, 0]\nradius = 1\nmaterial = \"lamp\"\n";
+        let scene = load_str("test", text).expect("a scene").scene;
+        let settings = Settings::for_scene(&scene);
+        let placement = Placement::new(&scene, 8, 8);
+        let tracer = PathTracer {
+            scene: &scene,
+            placement: &placement,
+            settings: &settings,
+        };
+        // From a point within that a rounding has put outside.
+        let mut ray = camera_ray(&placement.camera, [0, 0], [0.5; 4], &placement.within);
+        let sphere = &placement.spheres[0];
+        ray.anchor = sphere.anchor;
+        ray.offset = (1.0 + 1.0e-9) * sphere.radius * DVec3::X;
+        let share = |inside| {
+            let hit = Hit {
+                t: 1.0,
+                index: 0,
+                inside,
+            };
+            tracer.emission_share(&ray, &hit, 0.3, 0.3)
+        };
+        assert_eq!(share(true), 1.0);
+        // From outside light sampling has a part.
+        assert!(share(false) < 0.9);
+    }
+}

@@ -49,7 +49,6 @@ pub fn segment_point(area: f64) -> DVec2 {
 pub struct Cap {
     pub aim: Aim,
     pub cosine: f64,
-    pub tilt: DVec3,
     pub horizon: DVec2,
     pub segment: f64,
     pub ellipse: f64,
@@ -80,7 +79,6 @@ pub fn cap_seen(aim: &Aim, normal: DVec3) -> Cap {
     Cap {
         aim: *aim,
         cosine: c,
-        tilt,
         horizon,
         segment,
         ellipse,
@@ -101,7 +99,8 @@ pub fn sample_cap(cap: &Cap, normal: DVec3, u: DVec2) -> (DVec3, f64) {
         0.0
     };
     let basis = basis_around(normal);
-    let tilt = DVec2::new(cap.tilt.dot(basis.tangent), cap.tilt.dot(basis.bitangent));
+    let flat = cap.aim.axis - c * normal;
+    let tilt = DVec2::new(flat.dot(basis.tangent), flat.dot(basis.bitangent));
     let along = tilt.try_normalize().unwrap_or(DVec2::X);
     let sin_t = tilt.length();
     let g = sin_t * cap.aim.rim;
