@@ -49,7 +49,8 @@ impl Lamp {
         let pole = random.direction();
         let across = random.range(0.0, 10.0) * pole.any_orthonormal_vector();
         // The wall falls away from its tangent plane.
-        let fall = across.length_squared() / (radius + (radius * radius - 100.0).sqrt());
+        let square = across.length_squared();
+        let fall = square / (radius + (radius * radius - square).sqrt());
         Self {
             x: rounded(across + (gap - fall) * pole),
             pole: Some(rounded(pole)),
