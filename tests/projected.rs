@@ -420,14 +420,17 @@ fn directions_have_their_density() {
                 error * (extents.len() as f64).sqrt() < 0.28 * mean,
                 "{place}"
             );
-            means.push((mean - cap.area) / error);
+            // Over a half space the rest is the same share of every row: there is no variance either, and
+            // what is left is rounding.
+            let excess = ((mean - cap.area).abs() - 16.0 * ULP * cap.area).max(0.0);
+            means.push(excess / error);
         }
     }
     let limit = sidak(p_values.len());
     eprintln!("{p_values:?}\n{means:?}");
     assert!(p_values.len() >= 22 && p_values.iter().all(|p| *p > limit));
     let most = normal_limit(means.len());
-    assert!(means.iter().all(|z| z.abs() < most), "{means:?}");
+    assert!(means.iter().all(|z| *z < most), "{means:?}");
 }
 
 #[test]
