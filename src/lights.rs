@@ -13,7 +13,7 @@ pub struct Light {
     pub sphere: usize,
     /// Luminance of its radiance.
     pub luminance: f64,
-    /// Of being drawn from the table: its share of the power of all.
+    /// Of being drawn from the table: its share of the power of all, of walls what is near the picture.
     pub probability: f64,
     /// In the alias table: the entry is this light below the threshold, else `alias`.
     pub threshold: f64,
@@ -34,15 +34,13 @@ pub struct Lights {
 /// it gains nothing (`benches/RESULTS.md`); where the gain ends was not measured.
 pub const MOST_WEIGHED: usize = 8;
 
-/// Whether light sampling finds this sphere from outside. Walls (with a pole frame) are left to BSDF
-/// sampling: they fill so much of the view that it finds them as well, and nothing is gained by
-/// directions that the rest of the scene mostly hides. So are lamps that only glass can see.
+/// Whether light sampling finds this sphere from outside. Walls (with a pole frame) fill so much of the view
+/// that BSDF sampling finds them as well, and the rest of the scene hides most of them: that both look for them
+/// still costs less for the same error, or in the lecture's scene the same (`benches/RESULTS.md`). Lamps that
+/// only glass can see are left to BSDF sampling.
 fn is_sampled(scene: &Scene, sphere: &PlacedSphere) -> bool {
     let emission = scene.materials[sphere.material].emission;
-    sphere.pole.is_none()
-        && sphere.side != Side::Inside
-        && luminance(emission) > 0.0
-        && !is_sealed(scene, sphere.source)
+    sphere.side != Side::Inside && luminance(emission) > 0.0 && !is_sealed(scene, sphere.source)
 }
 
 /// Whether a dielectric is all around `scene.spheres[lamp]`, and nothing in it scatters light but in
@@ -74,6 +72,16 @@ fn is_sealed(scene: &Scene, lamp: usize) -> bool {
     })
 }
 
+/// How far the spheres without a pole frame reach. A wall sends no more than a lamp of this radius at this
+/// distance would; what is beyond sends nothing into the picture.
+fn extent(placement: &Placement) -> f64 {
+    let centered = placement.spheres.iter().filter(|s| s.pole.is_none());
+    let reach = centered.map(|s| s.anchor.length() + s.radius);
+    let farthest = reach.fold(0.0, f64::max);
+    // Of walls alone none is larger than another.
+    if farthest > 0.0 { farthest } else { 1.0 }
+}
+
 impl Lights {
     /// The lights of `scene`; none if the lens straddles a lamp: what is sampled and what is not must
     /// be known when a ray hits it.
@@ -86,10 +94,15 @@ impl Lights {
             return Self::default();
         }
         let emitted = |i: usize| luminance(scene.materials[placement.spheres[i].material].emission);
+        let picture = extent(placement);
+        let size = |s: &PlacedSphere| match s.pole {
+            Some(_) => s.radius.min(picture),
+            None => s.radius,
+        };
         let spheres = placement.spheres.iter().enumerate();
         let chosen: Vec<(usize, f64)> = spheres
             .filter(|(_, s)| is_sampled(scene, s))
-            .map(|(i, s)| (i, s.radius * s.radius * emitted(i)))
+            .map(|(i, s)| (i, size(s).powi(2) * emitted(i)))
             .collect();
         let total: f64 = chosen.iter().map(|(_, power)| power).sum();
         if chosen.is_empty() || !(total > 0.0 && total.is_finite()) {

@@ -279,7 +279,7 @@ fn quiet_and_verbose() {
         &run.stderr,
         &[
             "device: ",
-            "effects: baked, pole, sobol, diffuse, emission, bsdf, roulette",
+            "effects: baked, pole, sobol, diffuse, emission, bsdf, lights, projected, mis, roulette",
         ],
     );
     folder.write("black.toml", BLACK);

@@ -193,6 +193,19 @@ fn camera() -> Layout {
     })
 }
 
+fn light() -> Layout {
+    host!(LightRecord {
+        anchor,
+        radius,
+        weight,
+        threshold,
+        other,
+        sphere,
+        pole,
+        curvature,
+    })
+}
+
 #[test]
 fn fixed_structs_agree() {
     let kernel = kernel(Stage::Path, &FULL);
@@ -231,15 +244,7 @@ fn fixed_structs_agree() {
         advanced,
     });
     check("Counters", &counters, &kernel);
-    let light = host!(LightRecord {
-        center,
-        radius,
-        weight,
-        threshold,
-        other,
-        sphere,
-    });
-    check("Light", &light, &kernel);
+    check("Light", &light(), &kernel);
 }
 
 #[test]
@@ -261,6 +266,17 @@ fn a_camera_without_lens_is_the_start_of_one_with_a_lens() {
         "{device:?}"
     );
     assert_eq!(mismatch(&camera(), &device, true), None);
+}
+
+#[test]
+fn a_light_about_its_centre_is_the_start_of_one_about_its_pole() {
+    let names = ["list", "bsdf", "emission", "diffuse", "lights", "table"];
+    let device = device(&kernel(Stage::Path, &names), "Light");
+    assert!(
+        device.0.iter().all(|(name, _)| name != "pole"),
+        "{device:?}"
+    );
+    assert_eq!(mismatch(&light(), &device, true), None);
 }
 
 #[test]

@@ -24,7 +24,8 @@ pub(super) const CASES: &[Case] = &[
         id: 17,
         name: "a near light, sampled",
         setup: "a light at 1 + e radii, e = 1e-7 to 1e-1: solid angle and projected solid angle \
-                within 1e-6/sqrt(2 e) of f64, or left to BSDF sampling below f32's resolution",
+                within 1e-6/sqrt(2 e) of f64, or left to BSDF sampling below f32's resolution; walls of \
+                radius 1e3 to 1e8 from 1e-6 to 10 above them, as well as f32 knows the height",
         run: Run::On(sampled::near),
     },
     Case {

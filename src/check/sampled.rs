@@ -9,17 +9,24 @@ use super::context::{Context, SceneText};
 use super::inputs::Random;
 use super::intersection::ULP;
 use crate::error::Result;
-use crate::reference::light::projected::cap_seen;
-use crate::reference::light::sphere::cone_height;
+use crate::reference::light::aim::{Aim, aim_center, aim_pole, cone_height};
+use crate::reference::light::projected::{Cap, cap_seen};
 use crate::settings::{Integrator, LightSampling, Settings};
 use crate::statistics::{mean_and_error, normal_limit};
 
 type Row = [f32; 4];
 
-/// A light of radius 1 whose centre is at `w` from a vertex with this normal, as f32 has it.
+/// A light and a vertex with this normal, as f32 has them: of radius 1, `x` from its centre, or with the
+/// outward normal `pole` and this curvature, `x` from its pole.
 struct Lamp {
-    w: DVec3,
+    x: DVec3,
+    pole: Option<DVec3>,
+    curvature: f64,
     normal: DVec3,
+}
+
+fn rounded(v: DVec3) -> DVec3 {
+    v.as_vec3().as_dvec3()
 }
 
 impl Lamp {
@@ -29,56 +36,96 @@ impl Lamp {
         let turn = random.range(0.0, 2.0 * PI);
         let across = turn.cos() * side + turn.sin() * normal.cross(side);
         let w = distance * (cosine * normal + (1.0 - cosine * cosine).sqrt() * across);
-        let rounded = |v: DVec3| v.as_vec3().as_dvec3();
         Self {
-            w: rounded(w),
+            x: rounded(-w),
+            pole: None,
+            curvature: 1.0,
             normal: rounded(normal),
         }
     }
 
-    fn rows(&self, random: &mut Random) -> [Row; 3] {
-        let row = |v: DVec3, w: f32| [v.x as f32, v.y as f32, v.z as f32, w];
-        [row(self.w, 1.0), row(self.normal, 0.0), random.unit4()]
+    /// A vertex this far above a wall, at most 10 from its pole along it.
+    fn wall(radius: f64, gap: f64, random: &mut Random) -> Self {
+        let pole = random.direction();
+        let across = random.range(0.0, 10.0) * pole.any_orthonormal_vector();
+        // The wall falls away from its tangent plane.
+        let square = across.length_squared();
+        let fall = square / (radius + (radius * radius - square).sqrt());
+        Self {
+            x: rounded(across + (gap - fall) * pole),
+            pole: Some(rounded(pole)),
+            curvature: f64::from((1.0 / radius) as f32),
+            normal: rounded(random.direction()),
+        }
     }
 
-    fn area(&self) -> f64 {
-        cap_seen(self.w, 1.0, self.normal).area
+    fn rows(&self, random: &mut Random) -> [Row; 4] {
+        let row = |v: DVec3, w: f32| [v.x as f32, v.y as f32, v.z as f32, w];
+        let pole = self.pole.unwrap_or_default();
+        [
+            row(self.x, self.curvature as f32),
+            row(pole, 0.0),
+            row(self.normal, 0.0),
+            random.unit4(),
+        ]
+    }
+
+    fn aim(&self) -> Aim {
+        match self.pole {
+            Some(pole) => aim_pole(self.x, pole, self.curvature),
+            None => aim_center(self.x, 1.0),
+        }
+    }
+
+    fn cap(&self) -> Cap {
+        cap_seen(&self.aim(), self.normal)
     }
 
     /// How far roundings of the distance and of the cosine by so many ulp move the area, in f64.
     fn slope(&self, ulps: f64) -> f64 {
-        let axis = self.w.normalize();
+        let aim = self.aim();
+        let area = self.cap().area;
         let moved = |by: f64| {
-            let farther = cap_seen(self.w * (1.0 + by), 1.0, self.normal).area;
-            let turned = cap_seen(self.w, 1.0, self.normal + by * axis).area;
-            (farther - self.area()).abs() + (turned - self.area()).abs()
+            let farther = cap_seen(&aim_center(self.x * (1.0 + by), 1.0), self.normal).area;
+            let turned = cap_seen(&aim, self.normal + by * aim.axis).area;
+            (farther - area).abs() + (turned - area).abs()
         };
         moved(ulps * ULP) + moved(-ulps * ULP)
     }
 }
 
-/// What the kernel makes of lamps: solid angle over 2 pi, projected solid angle, and a direction.
-fn seen(context: &Context, lamps: &[Lamp], random: &mut Random) -> Result<Vec<(f64, f64, DVec3)>> {
-    let inputs: Vec<[Row; 3]> = lamps.iter().map(|lamp| lamp.rows(random)).collect();
-    let squares: Vec<Row> = inputs
-        .iter()
-        .map(|[w, ..]| [w[0] * w[0] + w[1] * w[1] + w[2] * w[2], 1.0, 0.0, 0.0])
-        .collect();
-    let effects = ["baked", "emission", "lights", "projected"];
+/// What the kernel makes of a lamp.
+struct Seen {
+    /// 1 - cos of the half angle.
+    height: f64,
+    outside: bool,
+    /// Projected solid angle.
+    area: f64,
+    direction: DVec3,
+}
+
+fn seen(context: &Context, lamps: &[Lamp], random: &mut Random) -> Result<Vec<Seen>> {
+    let inputs: Vec<[Row; 4]> = lamps.iter().map(|lamp| lamp.rows(random)).collect();
+    let effects = ["baked", "emission", "lights", "projected", "pole"];
     let probe = context.probe(&effects)?;
-    let heights: Vec<Row> = probe.call("cone_height", &squares)?;
-    let caps: Vec<[Row; 2]> = inputs.iter().map(|[w, normal, _]| [*w, *normal]).collect();
+    let spheres: Vec<[Row; 2]> = inputs.iter().map(|[x, pole, ..]| [*x, *pole]).collect();
+    let aims: Vec<[Row; 2]> = probe.call("aim_at", &spheres)?;
+    let caps: Vec<[Row; 3]> = inputs
+        .iter()
+        .map(|[x, pole, n, _]| [*x, *pole, *n])
+        .collect();
     let areas: Vec<Row> = probe.call("cap_seen", &caps)?;
     let samples: Vec<Row> = probe.call("sample_cap", &inputs)?;
-    let all = heights.iter().zip(&areas).zip(&samples);
+    let all = aims.iter().zip(&areas).zip(&samples);
     Ok(all
-        .map(|((height, area), sample)| {
+        .map(|(([_, aim], area), sample)| {
             let direction = sample.map(f64::from);
-            (
-                f64::from(height[0]),
-                f64::from(area[0]),
-                DVec3::new(direction[0], direction[1], direction[2]),
-            )
+            Seen {
+                height: f64::from(aim[3]),
+                outside: aim[2] != 0.0,
+                area: f64::from(area[0]),
+                direction: DVec3::new(direction[0], direction[1], direction[2]),
+            }
         })
         .collect())
 }
@@ -98,22 +145,30 @@ pub(super) fn far(context: &Context) -> Result<Measure> {
         })
         .collect();
     let found = seen(context, &lamps, &mut random)?;
-    for (lamp, (height, area, direction)) in lamps.iter().zip(found) {
-        let place = || format!("a light at {}, normal {}", lamp.w, lamp.normal);
-        // WGSL 15.7.4: two products, two sums, two divisions, a root.
-        let truth = cone_height(lamp.w.length_squared(), 1.0) * context.disturbed(1.0e-3);
+    for (
+        lamp,
+        Seen {
+            height,
+            area,
+            direction,
+            ..
+        },
+    ) in lamps.iter().zip(found)
+    {
+        let place = || format!("a light at {}, normal {}", -lamp.x, lamp.normal);
+        // WGSL 15.7.4: an inverse root, twice, products, sums, a division, a root.
+        let truth = cone_height(&lamp.aim()) * context.disturbed(1.0e-3);
         measure.add((height / truth - 1.0).abs() / (16.0 * ULP), place);
         // The cosine and the distance have some roundings, and what follows some more.
-        let cap = cap_seen(lamp.w, 1.0, lamp.normal);
+        let cap = lamp.cap();
         let truth = cap.area * context.disturbed(1.0e-3);
         let bound = 24.0 * ULP * (cap.area + cap.segment) + lamp.slope(6.0);
         // The least number of f32 is not 0.
         measure.add((area - truth).abs() / bound.max(1.0e-36), place);
         if area > 0.0 && cap.area > 0.0 {
             // A direction has roundings of its own, its height above the horizon their root.
-            let axis = lamp.w.normalize();
-            let beyond = axis.cross(direction).length() - lamp.w.length().recip();
-            let heights = (32.0 * ULP).sqrt() * cap.sine.powi(2);
+            let beyond = cap.aim.axis.cross(direction).length() - cap.aim.sine;
+            let heights = (32.0 * ULP).sqrt() * cap.aim.sine.powi(2);
             measure.add(beyond / (16.0 * ULP + heights), place);
         }
     }
@@ -131,22 +186,60 @@ pub(super) fn near(context: &Context) -> Result<Measure> {
         })
         .collect();
     let found = seen(context, &lamps, &mut random)?;
-    for (lamp, (height, area, _)) in lamps.iter().zip(found) {
-        let ww = lamp.w.length_squared();
-        let e = (ww - 1.0) / (lamp.w.length() + 1.0);
+    for (lamp, Seen { height, area, .. }) in lamps.iter().zip(found) {
+        let (xx, aim) = (lamp.x.length_squared(), lamp.aim());
+        let e = (xx - 1.0) / (aim.distance + 1.0);
         let place = || format!("{e:e} above a light, normal {}", lamp.normal);
         // Four roundings of the squared distance: the kernel may take the vertex for inside.
         if e < 4.0 * ULP {
             continue;
         }
         let bound = 1.0e-6 / (2.0 * e).sqrt();
-        let truth = cone_height(ww, 1.0) * context.disturbed(0.02);
+        let truth = cone_height(&aim) * context.disturbed(0.02);
         measure.add((height - truth).abs() / bound, place);
-        let truth = lamp.area() * context.disturbed(0.02);
+        let truth = lamp.cap().area * context.disturbed(0.02);
         // The area's derivative to the cosine of the half angle is at most 2 pi.
         measure.add((area - truth).abs() / (2.0 * PI * bound), place);
     }
+    walls(context, &mut measure)?;
     Ok(measure)
+}
+
+/// Walls, about their poles: cos of the half angle is known as well as the square of the vertex's height.
+fn walls(context: &Context, measure: &mut Measure) -> Result<()> {
+    let mut random = Random::new("near walls");
+    let lamps: Vec<Lamp> = (0..context.size(20_000, 200_000))
+        .map(|_| {
+            let (radius, gap) = (random.magnitude(3.0, 8.0), random.magnitude(-6.0, 1.0));
+            Lamp::wall(radius, gap, &mut random)
+        })
+        .collect();
+    let found = seen(context, &lamps, &mut random)?;
+    for (lamp, seen) in lamps.iter().zip(found) {
+        let (aim, k, x) = (lamp.aim(), lamp.curvature, lamp.x.length());
+        let place = || {
+            format!(
+                "{} off a wall of {:e}, normal {}",
+                lamp.x,
+                1.0 / k,
+                lamp.normal
+            )
+        };
+        // cos^2 is k C/(1 + k C): three roundings of each of the products that C is the sum of.
+        let rounding = 6.0 * ULP * k * x * (2.0 + k * x);
+        let square = aim.rim * aim.rim;
+        if square < rounding {
+            continue;
+        }
+        let outside = if seen.outside { 0.0 } else { f64::INFINITY };
+        measure.add(outside, place);
+        let bound = rounding / aim.rim + 6.0 * ULP;
+        let truth = cone_height(&aim) * context.disturbed(0.02);
+        measure.add((seen.height - truth).abs() / bound, place);
+        let truth = lamp.cap().area * context.disturbed(0.02);
+        measure.add((seen.area - truth).abs() / (2.0 * PI * bound), place);
+    }
+    Ok(())
 }
 
 pub(super) fn strategies(context: &Context) -> Result<Measure> {

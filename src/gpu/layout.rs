@@ -74,17 +74,19 @@ pub(crate) fn light_weight(index: usize, placement: &Placement, effects: &Effect
         })
 }
 
-/// `Light` of `shaders/light/sphere.wesl`.
+/// `Light` of `shaders/light/sphere.wesl`. Without pole frames the kernel's struct ends before theirs.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 #[expect(missing_docs, reason = "the members are those of the kernel's struct")]
 pub struct LightRecord {
-    pub center: [f32; 3],
+    pub anchor: [f32; 3],
     pub radius: f32,
     pub weight: f32,
     pub threshold: f32,
     pub other: u32,
     pub sphere: u32,
+    pub pole: [f32; 3],
+    pub curvature: f32,
 }
 
 impl LightRecord {
@@ -93,12 +95,17 @@ impl LightRecord {
     pub fn new(light: &Light, placement: &Placement, effects: &Effects) -> Self {
         let sphere = &placement.spheres[light.sphere];
         Self {
-            center: sphere.anchor.as_vec3().to_array(),
-            radius: sphere.radius as f32,
+            anchor: sphere.anchor.as_vec3().to_array(),
+            radius: match sphere.pole {
+                Some(_) => 0.0,
+                None => sphere.radius as f32,
+            },
             weight: light_weight(light.sphere, placement, effects) as f32,
             threshold: light.threshold as f32,
             other: light.alias as u32,
             sphere: light.sphere as u32,
+            pole: sphere.pole.unwrap_or_default().as_vec3().to_array(),
+            curvature: (1.0 / sphere.radius) as f32,
         }
     }
 }

@@ -22,12 +22,15 @@ impl Uploads {
         effects: &Effects,
     ) -> Self {
         let mut all: Vec<(u32, &'static str, Vec<u8>)> = Vec::new();
-        if kernel.has_binding(14) {
-            let lights = placement.lights.table.iter();
-            let records: Vec<LightRecord> = lights
-                .map(|light| LightRecord::new(light, placement, effects))
-                .collect();
-            all.push((14, "lights", bytemuck::cast_slice(&records).to_vec()));
+        if kernel.has_binding(14)
+            && let Some((_, size)) = kernel.struct_members("Light")
+        {
+            let mut bytes = Vec::new();
+            for light in &placement.lights.table {
+                let record = LightRecord::new(light, placement, effects);
+                bytes.extend_from_slice(&bytemuck::bytes_of(&record)[..size as usize]);
+            }
+            all.push((14, "lights", bytes));
         }
         if effects.has("baked") {
             return Self(all);

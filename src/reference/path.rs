@@ -11,6 +11,7 @@ use super::bsdf::sample::bsdf_sample;
 use super::bsdf::scatter::scatter;
 use super::core::random::{random4, sample_key};
 use super::core::sobol::sobol4;
+use super::light::aim::aim_at;
 use super::light::environment_radiance;
 use super::light::sphere::{light_density, power_weight, sample_light};
 use super::scene::camera::camera_ray;
@@ -188,13 +189,14 @@ impl PathTracer<'_> {
     fn emission_share(&self, ray: &Ray, hit: &Hit, density: f64, reach: f64) -> f64 {
         let lights = &self.placement.lights;
         let light = lights.of_sphere(hit.index);
-        let Some(light) = light.filter(|_| self.samples_lights() && density > 0.0) else {
+        let rivals = self.samples_lights() && density > 0.0 && !hit.inside;
+        let Some(light) = light.filter(|_| rivals) else {
             return 1.0;
         };
         let sphere = &self.placement.spheres[hit.index];
-        let w = (sphere.anchor - ray.anchor) - ray.offset;
+        let aim = aim_at(sphere, ray.anchor, ray.offset);
         let reach = (!lights.from_table(self.settings.light_sampling)).then_some(reach);
-        let other = light_density(light, w, sphere.radius, reach);
+        let other = light_density(light, &aim, reach);
         match self.settings.integrator {
             Integrator::Path => power_weight(density, other),
             _ if other > 0.0 => 0.0,
@@ -225,10 +227,15 @@ impl PathTracer<'_> {
         }
         let direction = bsdf_sample(s.direction, DVec3::ONE);
         let shadow = leave(ray.clone(), hit, vertex, &direction, self.placement.offset);
-        // A ray that misses the limb by a rounding has seen the light all the same.
-        let limb = s.w.dot(s.direction);
-        let hidden = closest_hit(&shadow, spheres)
-            .is_some_and(|first| first.index != s.sphere && first.t < limb);
+        // A ray that misses the limb by a rounding has seen the light all the same; lights are sampled
+        // from outside.
+        let hidden = closest_hit(&shadow, spheres).is_some_and(|first| {
+            if first.index == s.sphere {
+                first.inside
+            } else {
+                first.t < s.limb
+            }
+        });
         found.rays = 1;
         if hidden {
             return found;
@@ -447,5 +454,42 @@ impl Renderer for ReferenceRenderer {
 
     fn device_bytes(&self) -> u64 {
         0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::load::load_str;
+
+    #[test]
+    fn a_lamp_that_is_hit_from_within_keeps_its_emission() {
+        let text = "[camera]\nposition = [0, 0, 4]\nlook_at = [0, 0, 0]\nfov = 40.0\n[image]\nwidth = 8\n\
+                    height = 8\n[material.lamp]\ntype = \"dielectric\"\nior = 1.5\nemission = [1, 1, 1]\n\
+                    [[sphere]]\ncenter = [0, 0, 0]\nradius = 1\nmaterial = \"lamp\"\n";
+        let scene = load_str("test", text).expect("a scene").scene;
+        let settings = Settings::for_scene(&scene);
+        let placement = Placement::new(&scene, 8, 8);
+        let tracer = PathTracer {
+            scene: &scene,
+            placement: &placement,
+            settings: &settings,
+        };
+        // From a point within that a rounding has put outside.
+        let mut ray = camera_ray(&placement.camera, [0, 0], [0.5; 4], &placement.within);
+        let sphere = &placement.spheres[0];
+        ray.anchor = sphere.anchor;
+        ray.offset = (1.0 + 1.0e-9) * sphere.radius * DVec3::X;
+        let share = |inside| {
+            let hit = Hit {
+                t: 1.0,
+                index: 0,
+                inside,
+            };
+            tracer.emission_share(&ray, &hit, 0.3, 0.3)
+        };
+        assert_eq!(share(true), 1.0);
+        // From outside light sampling has a part.
+        assert!(share(false) < 0.9);
     }
 }

@@ -45,7 +45,11 @@ pub(super) fn geometry(scene: &Scene, placement: &Placement, effects: &Effects) 
     }
     if effects.has("lights") && !effects.has("table") {
         text += "import package::scene::ray::Vertex;\n\
-                 import package::light::sphere::{Weighed, weigh};\n";
+                 import package::light::sphere::{Weighed, weigh};\n\
+                 import package::light::aim::aim_center;\n";
+        if effects.has("pole") {
+            text += "import package::light::aim::aim_pole;\n";
+        }
     }
     closest_hit(&mut text, placement, effects);
     frame_of(&mut text, placement, effects);
@@ -215,13 +219,22 @@ fn light_weights(text: &mut String, placement: &Placement, effects: &Effects) {
               var chosen: Weighed;\nchosen.v = u;\n";
     for light in &placement.lights.table {
         let sphere = &placement.spheres[light.sphere];
+        let x = format!(
+            "(vertex.anchor - {}) + vertex.offset",
+            vector(sphere.anchor)
+        );
+        let aim = match sphere.pole {
+            Some(normal) => format!(
+                "aim_pole({x}, {}, {})",
+                vector(normal),
+                number(1.0 / sphere.radius)
+            ),
+            None => format!("aim_center({x}, {})", number(sphere.radius)),
+        };
         let _ = writeln!(
             text,
-            "chosen = weigh(chosen, vertex, own, {}, {}, {}, {}u);",
-            vector(sphere.anchor),
-            number(sphere.radius),
-            weights[light.sphere],
-            light.sphere
+            "chosen = weigh(chosen, vertex, own, {aim}, {}, {}u);",
+            weights[light.sphere], light.sphere
         );
     }
     *text += "return chosen;\n}\n";

@@ -30,6 +30,7 @@ sources![
     "bsdf/reflective",
     "bsdf/evaluate",
     "bsdf/event",
+    "light/aim",
     "light/environment",
     "light/projected",
     "light/sphere",

@@ -4,12 +4,14 @@
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
+use gpu_trace::check::Random;
 use gpu_trace::effects::Effects;
 use gpu_trace::film::Film;
 use gpu_trace::gpu::device::{DRIVER_ADVICE, DeviceChoice, Gpu, open};
 use gpu_trace::gpu::probe::Probe;
 use gpu_trace::gpu::renderer::GpuRenderer;
 use gpu_trace::placement::Placement;
+use gpu_trace::reference::light::aim::{Aim, aim_pole};
 use gpu_trace::reference::path::ReferenceRenderer;
 use gpu_trace::render::render_quietly;
 use gpu_trace::scene::Scene;
@@ -25,6 +27,21 @@ pub(crate) const ULP: f64 = 2.0 * U;
 
 /// A row of the probe.
 pub(crate) type Row = [f32; 4];
+
+/// A sphere with a pole frame: its radius, and how far a vertex is above it and along it from its pole.
+pub(crate) type Wall = (f64, f64, f64);
+
+/// The rows of the wall, as f32 has them, and what the vertex sees.
+pub(crate) fn walled((radius, gap, along): Wall, random: &mut Random) -> ([Row; 2], Aim) {
+    let pole = random.direction();
+    let across = along * pole.any_orthonormal_vector();
+    // The wall falls away from its tangent plane.
+    let fall = along * along / (radius + (radius * radius - along * along).sqrt());
+    let x = to_row(across + (gap - fall) * pole, 1.0 / radius);
+    let pole = to_row(pole, 0.0);
+    let aim = aim_pole(vector(x), vector(pole), f64::from(x[3]));
+    ([x, pole], aim)
+}
 
 /// The device of this test binary.
 ///

@@ -1,5 +1,6 @@
 //! Twins of `shaders/light/`.
 
+pub mod aim;
 pub mod projected;
 pub mod sphere;
 

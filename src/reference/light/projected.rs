@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 
 use glam::{DVec2, DVec3};
 
+use super::aim::Aim;
 use crate::reference::core::sampling::basis_around;
 
 /// Area of the segment of the unit disc with half angle h, for p = (cos h, sin h), h in [0, pi].
@@ -42,40 +43,42 @@ pub fn segment_point(area: f64) -> DVec2 {
     DVec2::new(if area > 0.5 * PI { -p.x } else { p.x }, p.y)
 }
 
-/// A light as a vertex sees it; see the kernel's struct.
+/// A light as a vertex with a normal sees it; see the kernel's struct.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[expect(missing_docs, reason = "the members are those of the kernel's struct")]
 pub struct Cap {
+    pub aim: Aim,
     pub cosine: f64,
-    pub sine: f64,
-    pub rim: f64,
     pub horizon: DVec2,
     pub segment: f64,
     pub ellipse: f64,
     pub area: f64,
 }
 
-/// The cap of a light of this radius; `w` goes from the vertex to its centre. The area is 0 if nothing
-/// of it is above the horizon, or if the vertex is not outside.
+/// The cap of a light. The area is 0 if nothing of it is above the horizon, or if the vertex is not
+/// outside.
 #[must_use]
-pub fn cap_seen(w: DVec3, radius: f64, normal: DVec3) -> Cap {
-    let distance = w.length();
-    let (c, s) = (normal.dot(w) / distance, radius / distance);
-    let rim = ((distance - radius) * (distance + radius)).max(0.0).sqrt() / distance;
-    let across = ((s - c) * (s + c)).max(0.0);
+pub fn cap_seen(aim: &Aim, normal: DVec3) -> Cap {
+    let (c, s, rim) = (normal.dot(aim.axis), aim.sine, aim.rim);
+    let tilt = aim.axis - c * normal;
+    let meet = if rim < s {
+        tilt.length_squared() - rim * rim
+    } else {
+        (s - c) * (s + c)
+    };
+    let across = meet.max(0.0);
     let horizon = DVec2::new(rim, across.sqrt()) / (across + rim * rim).max(1.0e-300).sqrt();
-    let (segment, ellipse) = if c >= s {
+    let (segment, ellipse) = if c > 0.0 && meet <= 0.0 {
         (0.0, PI)
     } else {
         let meeting = DVec2::new(-c * horizon.x, horizon.y) / s;
         (segment_area(horizon), segment_area(meeting))
     };
     let area = (segment + s * s * c * ellipse).max(1.0e-6 * segment);
-    let seen = c > -s && distance > radius;
+    let seen = (c > 0.0 || meet > 0.0) && aim.outside;
     Cap {
+        aim: *aim,
         cosine: c,
-        sine: s,
-        rim,
         horizon,
         segment,
         ellipse,
@@ -86,8 +89,8 @@ pub fn cap_seen(w: DVec3, radius: f64, normal: DVec3) -> Cap {
 /// A direction to the part of a cap above the horizon, and the extent: pdf = cos/extent in solid
 /// angle. The area must be positive.
 #[must_use]
-pub fn sample_cap(cap: &Cap, w: DVec3, normal: DVec3, u: DVec2) -> (DVec3, f64) {
-    let (s, c) = (cap.sine, cap.cosine);
+pub fn sample_cap(cap: &Cap, normal: DVec3, u: DVec2) -> (DVec3, f64) {
+    let (s, c) = (cap.aim.sine, cap.cosine);
     let share = if cap.segment <= 0.0 {
         1.0
     } else if c > 0.0 {
@@ -96,10 +99,11 @@ pub fn sample_cap(cap: &Cap, w: DVec3, normal: DVec3, u: DVec2) -> (DVec3, f64) 
         0.0
     };
     let basis = basis_around(normal);
-    let tilt = DVec2::new(w.dot(basis.tangent), w.dot(basis.bitangent));
+    let flat = cap.aim.axis - c * normal;
+    let tilt = DVec2::new(flat.dot(basis.tangent), flat.dot(basis.bitangent));
     let along = tilt.try_normalize().unwrap_or(DVec2::X);
-    let sin_t = tilt.length() / w.length();
-    let g = sin_t * cap.rim;
+    let sin_t = tilt.length();
+    let g = sin_t * cap.aim.rim;
     let (local, extent) = if u.x < share {
         let p = segment_point(u.x / share * cap.ellipse);
         let y = (2.0 * u.y - 1.0) * p.y;

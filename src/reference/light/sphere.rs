@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 
 use glam::{DVec2, DVec3};
 
+use super::aim::{Aim, aim_at, cone_height};
 use super::projected::{cap_seen, sample_cap};
 use crate::lights::{Light, Lights};
 use crate::placement::Placement;
@@ -24,38 +25,32 @@ pub fn light_from_table(lights: &Lights, u: [f64; 2]) -> Option<&Light> {
     }
 }
 
-/// 1 - cos of the half angle of the cone that a sphere fills, at the squared distance `ww`.
+/// For MIS, the density in solid angle with which light sampling finds a direction to `light`; `reach` as
+/// in the kernel, `None` where lights are drawn from the table.
 #[must_use]
-pub fn cone_height(ww: f64, radius: f64) -> f64 {
-    let ss = radius * radius / ww;
-    ss / (1.0 + (1.0 - ss).max(0.0).sqrt())
-}
-
-/// For MIS, the density in solid angle with which light sampling finds a direction to `light`, whose
-/// centre is at `w`; `reach` as in the kernel, `None` where lights are drawn from the table.
-#[must_use]
-pub fn light_density(light: &Light, w: DVec3, radius: f64, reach: Option<f64>) -> f64 {
-    let ww = w.length_squared();
-    if ww <= radius * radius {
+pub fn light_density(light: &Light, aim: &Aim, reach: Option<f64>) -> f64 {
+    if !aim.outside {
         return 0.0;
     }
     match reach {
         Some(reach) => light.luminance * reach,
-        None => light.probability / (TAU * cone_height(ww, radius)),
+        None => light.probability / (TAU * cone_height(aim)),
     }
 }
 
-/// A direction to a sphere, uniform in the cone that it fills, and its pdf in solid angle; `w` goes from
-/// the vertex to the centre. `None` from within.
+/// The length of the tangent for a direction at the limb.
 #[must_use]
-pub fn sample_cone(w: DVec3, radius: f64, u: DVec2) -> Option<(DVec3, f64)> {
-    let ww = w.length_squared();
-    if ww <= radius * radius {
-        return None;
-    }
-    let height = cone_height(ww, radius);
-    let direction = cap_direction(w / ww.sqrt(), height, u);
-    Some((direction, 1.0 / (TAU * height)))
+pub fn limb_distance(aim: &Aim, direction: DVec3) -> f64 {
+    aim.distance * aim.axis.dot(direction)
+}
+
+/// A direction to a sphere, uniform in the cone that it fills, and its pdf in solid angle. `None` from
+/// within.
+#[must_use]
+pub fn sample_cone(aim: &Aim, u: DVec2) -> Option<(DVec3, f64)> {
+    let height = cone_height(aim);
+    let direction = cap_direction(aim.axis, height, u);
+    aim.outside.then(|| (direction, 1.0 / (TAU * height)))
 }
 
 /// A direction to a light; see the kernel's struct.
@@ -65,7 +60,7 @@ pub struct LightSample {
     pub direction: DVec3,
     pub density: f64,
     pub rival: f64,
-    pub w: DVec3,
+    pub limb: f64,
     pub sphere: usize,
     pub reach: f64,
 }
@@ -83,30 +78,29 @@ pub fn sample_light(
     let place = DVec2::new(u[0], u[1]);
     let to = |light: &Light| {
         let target = &placement.spheres[light.sphere];
-        let w = (target.anchor - vertex.anchor) - vertex.offset;
-        (w, target.radius)
+        aim_at(target, vertex.anchor, vertex.offset)
     };
     if !lights.from_table(sampling) {
         return weighed_light(lights, vertex, own, u, &to);
     }
     let light = light_from_table(lights, [u[2], u[3]])?;
-    let (w, radius) = to(light);
+    let aim = to(light);
     let (direction, density) = match sampling {
-        LightSampling::Cone => sample_cone(w, radius, place)?,
+        LightSampling::Cone => sample_cone(&aim, place)?,
         LightSampling::Projected => {
-            let cap = cap_seen(w, radius, vertex.normal);
+            let cap = cap_seen(&aim, vertex.normal);
             if cap.area <= 0.0 {
                 return None;
             }
-            let (direction, extent) = sample_cap(&cap, w, vertex.normal, place);
+            let (direction, extent) = sample_cap(&cap, vertex.normal, place);
             (direction, vertex.normal.dot(direction).max(0.0) / extent)
         }
     };
     (light.sphere != own).then(|| LightSample {
         direction,
         density: light.probability * density,
-        rival: light_density(light, w, radius, None),
-        w,
+        rival: light_density(light, &aim, None),
+        limb: limb_distance(&aim, direction),
         sphere: light.sphere,
         reach: 0.0,
     })
@@ -118,14 +112,13 @@ fn weighed_light(
     vertex: &Vertex,
     own: usize,
     u: [f64; 4],
-    to: &dyn Fn(&Light) -> (DVec3, f64),
+    to: &dyn Fn(&Light) -> Aim,
 ) -> Option<LightSample> {
     let mut total = 0.0;
     let mut chosen = None;
     let mut v = u[2];
     for light in &lights.table {
-        let (w, radius) = to(light);
-        let cap = cap_seen(w, radius, vertex.normal);
+        let cap = cap_seen(&to(light), vertex.normal);
         let strength = if light.sphere == own {
             0.0
         } else {
@@ -139,20 +132,20 @@ fn weighed_light(
         };
         if v < share {
             v /= share;
-            chosen = Some((light, w, cap, strength));
+            chosen = Some((light, cap, strength));
         } else {
             v = ((v - share) / (1.0 - share)).min(1.0 - f64::EPSILON);
         }
     }
-    let (light, w, cap, strength) = chosen?;
+    let (light, cap, strength) = chosen?;
     let reach = 1.0 / total;
-    let (direction, extent) = sample_cap(&cap, w, vertex.normal, DVec2::new(u[0], u[1]));
+    let (direction, extent) = sample_cap(&cap, vertex.normal, DVec2::new(u[0], u[1]));
     let cosine = vertex.normal.dot(direction).max(0.0);
     Some(LightSample {
         direction,
         density: strength * reach * cosine / extent,
         rival: light.luminance * reach * cosine,
-        w,
+        limb: limb_distance(&cap.aim, direction),
         sphere: light.sphere,
         reach,
     })
