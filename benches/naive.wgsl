@@ -105,7 +105,7 @@ fn trace(pixel: vec2u, sample: u32) -> vec4f {
         }
         let v = random4(pixel, sample, bounce + 1u);
         throughput *= sphere.albedo;
-        let survival = min(2.0 * max(max(throughput.x, throughput.y), throughput.z), 1.0);
+        let survival = min(4.0 * max(max(throughput.x, throughput.y), throughput.z), 1.0);
         if v.w >= survival {
             break;
         }

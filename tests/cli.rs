@@ -520,7 +520,7 @@ fn whichever_rule_comes_first_ends_the_render() {
 #[test]
 fn adaptive_samples_are_shared_out() {
     let folder = Folder::new();
-    let base = "glass --size 48x40 --adaptive";
+    let base = "lecture-reflective --size 48x40 --adaptive";
     let summary = folder.ok(&format!(
         "{base} --spp 512 -o a.exr --aov samples --stats a.json"
     ));

@@ -124,15 +124,15 @@ fn the_reference_has_the_lectures_variance() {
 }
 
 /// Variance with cosine sampling and roulette, which is exact in f32 too: a path's weight falls as
-/// rho^n to 1/2, with rho^n from there on brought to 1/2 with probability s, and then stays 1/2 as
+/// rho^n to 1/4, with rho^n from there on brought to 1/4 with probability s, and then stays 1/4 as
 /// long as it survives, each time with probability rho.
 fn with_roulette(rho: f64) -> f64 {
     let mut weight = rho;
-    while weight >= 0.5 {
+    while weight >= 0.25 {
         weight *= rho;
     }
-    let s = 2.0 * weight;
-    let (mean, variance) = (0.5 / (1.0 - rho), 0.25 * rho / (1.0 - rho).powi(2));
+    let s = 4.0 * weight;
+    let (mean, variance) = (0.25 / (1.0 - rho), 0.0625 * rho / (1.0 - rho).powi(2));
     s * (variance + mean * mean) - (s * mean).powi(2)
 }
 

@@ -24,7 +24,7 @@ pub(super) const CASES: &[Case] = &[
         id: 30,
         name: "roulette",
         setup: "on and off have the same mean (3.9 standard errors); a path's weight is 0 or in \
-                [1/2, 1]; what loses no light does not die",
+                [1/4, 1]; what loses no light does not die",
         run: Run::On(roulette),
     },
     Case {
@@ -153,7 +153,7 @@ fn first_kind(scene: &Scene) -> &str {
 }
 
 /// A black lamp of radiance 1 in a dark closed sphere: one sample is the weight with which its path
-/// came to the lamp, or 0. Roulette ends a path of weight w below 1/2 with 1 - 2 w, else makes it 1/2.
+/// came to the lamp, or 0. Roulette ends a path of weight w below 1/4 with 1 - 4 w, else makes it 1/4.
 fn weights(context: &Context, albedo: f64, measure: &mut Measure) -> Result<()> {
     let scene = SceneText::new([0.8, 0.0, 0.0], [0.0, 0.8, 0.3])
         .diffuse("wall", albedo, 0.0)
@@ -167,7 +167,7 @@ fn weights(context: &Context, albedo: f64, measure: &mut Measure) -> Result<()> 
         ..context.settings(&scene, 64, 1)
     };
     let film = context.render(&scene, &settings)?;
-    let least = 0.5 * context.disturbed(0.5);
+    let least = 0.25 * context.disturbed(0.5);
     // The product of the albedos and one division: less than a hundred roundings.
     let slack = 100.0 * U;
     let values = means(&film);

@@ -29,10 +29,10 @@ use crate::sampler::Sampler;
 use crate::scene::{MaterialKind, Scene};
 use crate::settings::{Integrator, Rect, Settings, stream_words};
 
-/// Survival is the largest component of the throughput over 1/2.
+/// Survival is the largest component of the throughput over 1/4.
 #[must_use]
 pub fn roulette_survival(largest: f64) -> f64 {
-    (2.0 * largest).min(1.0)
+    (4.0 * largest).min(1.0)
 }
 
 /// Dimension of the numbers for light sampling at the first vertex.
