@@ -15,8 +15,9 @@ use gpu_trace::gpu::device::{self, DeviceChoice};
 use gpu_trace::gpu::renderer::GpuRenderer;
 use gpu_trace::placement::Placement;
 use gpu_trace::render::render_quietly;
+use gpu_trace::sampler::Sampler;
 use gpu_trace::scene::{Scene, builtin};
-use gpu_trace::settings::{GeometryChoice, Rect, Settings};
+use gpu_trace::settings::{GeometryChoice, Integrator, Rect, Settings};
 
 /// Rounds in which all contestants take turns.
 const ROUNDS: usize = 5;
@@ -62,8 +63,13 @@ fn ours(
     change: impl FnOnce(&mut Settings),
     with: &[&'static str],
 ) -> Contestant<'static> {
-    let mut settings = Settings::for_scene(scene);
-    settings.samples = 0..SPP;
+    let mut settings = Settings {
+        samples: 0..SPP,
+        // What the baseline has: the same paths.
+        integrator: Integrator::Bsdf,
+        sampler: Sampler::Independent,
+        ..Settings::for_scene(scene)
+    };
     change(&mut settings);
     let placement = Placement::with_offset(scene, settings.width, settings.height, settings.offset);
     let mut effects = Effects::derive(scene, &placement, &settings);

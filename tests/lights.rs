@@ -286,6 +286,28 @@ fn lamps_close_by_and_walls_are_sampled_without_bias() {
     }
 }
 
+/// The independent truth: f64, and nothing of light sampling in it.
+#[test]
+fn the_reference_without_light_sampling_agrees() {
+    for scene in [close_lamps(0), walls(0)] {
+        let bsdf = Settings {
+            integrator: Integrator::Bsdf,
+            seed: 1,
+            ..settings(&scene, 24, 18, 1 << 13)
+        };
+        let reference = render_cpu(&scene, &bsdf);
+        for how in SAMPLED {
+            let film = sampled(&scene, how, 1 << 13);
+            let (z, bias) = apart(&film, &reference, 1.0);
+            eprintln!("{how:?}: z = {z:.2}, bias {bias:.2e}");
+            assert!(z.abs() < 3.9, "{how:?}: {z} deviations, {bias:e}");
+            // Companion: 2 % too dark.
+            let (z, _) = apart(&film, &reference, 0.98);
+            assert!(z.abs() > 3.9, "2 % is not found: {z}");
+        }
+    }
+}
+
 #[test]
 fn both_backends_sample_the_same_lights() {
     for scene in [

@@ -323,7 +323,13 @@ def main():
                 peers["Mitsuba, no emitter sampling"] = without
             own = Own(binary, scene, folder)
             plain = Own(binary, scene, folder, "--sampler", "independent")
-            renderers = {**peers, "gpu-trace, independent": plain, "gpu-trace": own}
+            without = Own(binary, scene, folder, "--integrator", "bsdf")
+            renderers = {
+                **peers,
+                "gpu-trace, independent": plain,
+                "gpu-trace, no lamp sampling": without,
+                "gpu-trace": own,
+            }
             compare(own, scene, renderers, options)
             loads.append(os.getloadavg()[0])
     print(
