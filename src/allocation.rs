@@ -56,7 +56,7 @@ impl Allocation {
     /// What makes the image's relative error least for its samples, as far as `pilot` shows, with at
     /// most `most` times the samples of the least sampled tiles on average.
     ///
-    /// The error is that of [`Estimate`]: its square is a sum of V/n over tiles, which is least for
+    /// The error is that of [`Estimate`], without its correction, which is noise in a tile: its square is a sum of V/n over tiles, which is least for
     /// samples n as the root of V. A tile counts as half as rough as its roughest neighbour at least,
     /// since what the pilot has not met in a tile, a caustic say, may be all of its error.
     #[must_use]
@@ -99,9 +99,7 @@ impl Allocation {
         let floor = (0.1 * mean).powi(2);
         let mut squares = vec![0.0; self.steps.len()];
         for i in 0..self.rect.pixels() {
-            let (m, v) = (pilot.mean(i), pilot.variance_of_mean(i)?);
-            let relative = |c: usize| v[c] / (m[c] * m[c] + floor);
-            squares[self.tile(i)] += (0..3).map(relative).sum::<f64>() / 3.0;
+            squares[self.tile(i)] += pilot.relative_variance(i, floor)?[0];
         }
         let own: Vec<f64> = squares
             .iter()

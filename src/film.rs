@@ -111,7 +111,7 @@ pub struct Film {
     allocation: Allocation,
     /// By step.
     levels: Vec<Level>,
-    /// Windows go to one of two halves, each independent of the other.
+    /// Windows go to one of two halves, which are independent of each other unless a scramble has been cut.
     halves: [Half; 2],
     /// Empty until a window has some.
     aovs: Vec<AovSums>,
@@ -333,22 +333,22 @@ impl Film {
     }
 
     /// The mean over the channels of s²/(m² + `floor`), with the mean m of pixel `i` and its standard
-    /// error s; `None` where this is not known. It may be below zero, as noise; its mean over pixels is
-    /// what counts.
+    /// error s, and its jackknife; `None` where this is not known.
     ///
-    /// Rare and bright samples raise both s and m, so that the plain ratio is too small: a pixel that has
-    /// not met its light looks exact, and one that has looks bright. This is the jackknife of it
-    /// (Quenouille 1956): what the two halves say by themselves, twice as far off, is subtracted from
-    /// twice what all say. A single window has no halves.
+    /// Rare and bright samples raise both s and m, so that the ratio is too small: a pixel that has not met
+    /// its light looks exact, and one that has looks bright. In its jackknife (Quenouille 1956) what the
+    /// two halves say by themselves, twice as far off, is subtracted from twice what all say. That of
+    /// one pixel may be below zero, as noise; the mean over pixels is what counts. A single window has
+    /// no halves.
     #[must_use]
-    pub fn relative_variance(&self, i: usize, floor: f64) -> Option<f64> {
+    pub fn relative_variance(&self, i: usize, floor: f64) -> Option<[f64; 2]> {
         let level = self.level(i);
         let variance = self.variance_of_mean(i)?;
         let mean = self.mean(i);
         let over = |v: f64, m: f64| v / (m * m + floor);
         let all: f64 = (0..3).map(|c| over(variance[c], mean[c])).sum();
         if level.halves[1] == 0 {
-            return Some(all / 3.0);
+            return Some([all / 3.0; 2]);
         }
         let scale = level.scale();
         let by_itself = |(half, samples): (&Half, u64)| -> f64 {
@@ -357,7 +357,7 @@ impl Film {
             (0..3).map(share).sum()
         };
         let halves: f64 = self.halves.iter().zip(level.halves).map(by_itself).sum();
-        Some((2.0 * all - halves) / 3.0)
+        Some([all / 3.0, (2.0 * all - halves) / 3.0])
     }
 
     /// The degrees of freedom of [`variance_of_mean`](Self::variance_of_mean), where these are fewest;
@@ -400,7 +400,7 @@ mod tests {
     use crate::check::Random;
 
     /// Of pixels whose light is 1 and once in 64 samples 17: the relative variance that 64 samples say
-    /// that they have, over what it is; first with the mean of the same samples, then ours.
+    /// that they have, over what it is: plainly, and by the jackknife.
     fn said_of_rare_light() -> [f64; 2] {
         const SIDE: u32 = 256;
         let rect = Rect {
@@ -439,17 +439,9 @@ mod tests {
         let mean = 1.0 + 16.0 / 64.0;
         let floor = 0.01 * mean * mean;
         let truth = (256.0 / 64.0 - (16.0f64 / 64.0).powi(2)) / 64.0 / (mean * mean + floor);
-        let plain = |i| {
-            let (m, v) = (film.mean(i)[0], film.variance_of_mean(i).expect("16")[0]);
-            v / (m * m + floor)
-        };
-        let ours = |i| film.relative_variance(i, floor).expect("16 batches");
         let pixels = rect.pixels();
-        let over = |sum: f64| sum / (pixels as f64 * truth);
-        [
-            over((0..pixels).map(plain).sum()),
-            over((0..pixels).map(ours).sum()),
-        ]
+        let said = |i| film.relative_variance(i, floor).expect("16 batches");
+        [0, 1].map(|k| (0..pixels).map(|i| said(i)[k]).sum::<f64>() / (pixels as f64 * truth))
     }
 
     #[test]

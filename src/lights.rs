@@ -78,7 +78,7 @@ fn extent(placement: &Placement) -> f64 {
     let centered = placement.spheres.iter().filter(|s| s.pole.is_none());
     let reach = centered.map(|s| s.anchor.length() + s.radius);
     let farthest = reach.fold(0.0, f64::max);
-    // Of walls alone none is larger than another.
+    // Of walls alone none is larger than another, in whatever unit.
     if farthest > 0.0 { farthest } else { 1.0 }
 }
 

@@ -257,14 +257,20 @@ impl Run<'_> {
                 return Err(StoppedBy::Time);
             }
             let samples = origin + start..origin + window_end(start, range.end);
+            let wanted = samples.end;
             let window = self
                 .renderer
                 .render_tiles(samples, tiles.as_ref(), &mut self.control);
             match window {
                 Ok(window) => {
                     start = window.samples.end - origin;
+                    let short = window.samples.end < wanted;
                     film.add_to(step, &window);
                     self.control.kept |= film.samples() > 0;
+                    // For want of time, be there some left: windows begin where they always do.
+                    if short && !self.control.watch.interrupted() {
+                        return Err(StoppedBy::Time);
+                    }
                 }
                 Err(error) => {
                     self.failure = Some(error);

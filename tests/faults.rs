@@ -240,7 +240,7 @@ fn with_little_memory_a_render_is_refused_or_done() {
         let run = limited(&folder, &format!("ulimit -v {megabytes}000"), arguments);
         match run.code {
             Some(2) => {
-                let text = "error: 600x600 pixels need 0.0";
+                let text = "error: 600x600 pixels need 0.";
                 holds(&run.stderr, &[text, "GiB of memory", "--crop"]);
                 assert_eq!(before, folder.snapshot());
             }

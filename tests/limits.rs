@@ -5,14 +5,16 @@
 mod common;
 
 use std::cell::RefCell;
+use std::ops::Range;
 use std::time::Duration;
 
 use common::{gpu_renderer, means, render_cpu, render_gpu, scene, settings};
-use gpu_trace::error::Error;
-use gpu_trace::film::Film;
+use gpu_trace::allocation::Tiles;
+use gpu_trace::error::{Error, Result};
+use gpu_trace::film::{Film, PixelSums, Tally, Window};
 use gpu_trace::gpu::renderer::DispatchLimits;
-use gpu_trace::render::{Control, Renderer as _, Status, StoppedBy, Watch, render, render_quietly};
-use gpu_trace::settings::Settings;
+use gpu_trace::render::{Control, Renderer, Status, StoppedBy, Watch, render, render_quietly};
+use gpu_trace::settings::{Rect, Settings};
 
 /// A closed furnace that keeps all light.
 const FURNACE: &str = "
@@ -105,21 +107,22 @@ fn a_path_longer_than_any_dispatch_is_an_error_or_right() {
     }
 }
 
-/// Asks to stop after so many reports.
+/// Asks to stop after so many paths.
 struct Impatient {
-    left: u32,
+    enough: f64,
+    paths: u64,
     /// Reports after that.
     late: u32,
 }
 
 impl Watch for Impatient {
-    fn update(&mut self, _: &Status) {
-        self.late += u32::from(self.left == 0);
-        self.left = self.left.saturating_sub(1);
+    fn update(&mut self, status: &Status) {
+        self.late += u32::from(self.interrupted());
+        self.paths = status.paths;
     }
 
     fn interrupted(&self) -> bool {
-        self.left == 0
+        self.paths as f64 >= self.enough
     }
 }
 
@@ -134,15 +137,19 @@ fn large_images_stop_between_their_parts() {
         samples: 16,
     };
     let renderer = || gpu_renderer(&scene, &settings).with_limits(limits);
-    // Of windows of 16 and 48 samples, the first takes 17 or 18 dispatches.
-    let mut samples = Vec::new();
-    for left in [1, 20, 30, 40] {
-        let mut watch = Impatient { left, late: 0 };
+    // In the first window, of 16 samples, and in the second, of 48.
+    for samples in [0.1, 17.0, 30.0, 60.0] {
+        let mut watch = Impatient {
+            enough: samples * settings.crop.pixels() as f64,
+            paths: 0,
+            late: 0,
+        };
         let outcome = render(&mut renderer(), &settings, &mut watch);
         assert_eq!(outcome.stopped_by, StoppedBy::Interrupt);
         let done = outcome.film.samples();
-        samples.push(done);
-        assert_eq!(watch.late == 0, left > 1, "{left}: {} late", watch.late);
+        let first = samples < 16.0;
+        assert!(done == 16 || first && (4..16).contains(&done), "{done}");
+        assert_eq!(watch.late > 0, first, "{samples}: {} late", watch.late);
         let whole = render_gpu(
             &scene,
             &Settings {
@@ -150,10 +157,9 @@ fn large_images_stop_between_their_parts() {
                 ..settings.clone()
             },
         );
-        assert_eq!(means(&outcome.film), means(&whole), "{left}");
-        assert_eq!(outcome.film.tally(), whole.tally(), "{left}");
+        assert_eq!(means(&outcome.film), means(&whole), "{samples}");
+        assert_eq!(outcome.film.tally(), whole.tally(), "{samples}");
     }
-    assert_eq!(samples, [16; 4]);
 }
 
 /// Where one part of a large image goes, the others have to follow: there must be time for that.
@@ -196,4 +202,50 @@ fn large_images_keep_to_the_time() {
             "a part is missing"
         );
     }
+}
+
+/// A window that came back short for want of time is the last, whatever time is left then: none begins where
+/// windows never do.
+#[test]
+fn a_window_cut_short_is_the_last() {
+    struct Short;
+    impl Renderer for Short {
+        fn device(&self) -> (String, String, String) {
+            Default::default()
+        }
+        fn render_tiles(
+            &mut self,
+            samples: Range<u64>,
+            _: Option<&Tiles>,
+            _: &mut dyn Control,
+        ) -> Result<Window> {
+            // The second window.
+            let end = if samples.start == 16 { 24 } else { samples.end };
+            Ok(Window {
+                rect: RECT,
+                samples: samples.start..end,
+                batch: 4,
+                pixels: vec![PixelSums::default(); RECT.pixels()],
+                aovs: Vec::new(),
+                tally: Tally::default(),
+            })
+        }
+        fn show(&mut self, _: Rect) {}
+        fn device_bytes(&self) -> u64 {
+            0
+        }
+    }
+    const RECT: Rect = Rect {
+        x: 0,
+        y: 0,
+        width: 2,
+        height: 2,
+    };
+    let settings = Settings {
+        time: Some(Duration::from_secs(3600)),
+        ..settings(&scene(FURNACE), 2, 2, 256)
+    };
+    let outcome = render_quietly(&mut Short, &settings).expect("an image");
+    assert_eq!(outcome.stopped_by, StoppedBy::Time);
+    assert_eq!(outcome.film.samples(), 24);
 }

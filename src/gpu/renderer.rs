@@ -345,11 +345,10 @@ impl GpuRenderer {
         control: &mut dyn Control,
     ) -> Result<u64> {
         let begin = Instant::now();
-        let tiles = region.width.div_ceil(TILE) * region.height.div_ceil(TILE);
+        let tiles = tiles_of(region);
         let is_chosen = |tile: &u32| chosen.is_none_or(|c| c.has(*tile));
         let all = (0..tiles).filter(is_chosen).count() as u32;
-        // Of the region's pixels, those in chosen tiles: tiles at its edge may be smaller.
-        let pixels = region.pixels() as f64 * f64::from(all) / f64::from(tiles);
+        let pixels = chosen_pixels(region, chosen);
         let mut record = DispatchRecord {
             region_origin: [region.x, region.y],
             region_size: [region.width, region.height],
@@ -361,7 +360,7 @@ impl GpuRenderer {
         };
         let mut start = samples.start;
         while start < samples.end {
-            // The others will take slabs of this length, too.
+            // Where the first region stops, the others have to follow.
             let all_pixels = pixels.max(1.0) * (1.0 + rest.unwrap_or(0.0));
             let end = self.slab_end(start..samples.end, all_pixels);
             record.fresh = u32::from(start == samples.start);
@@ -507,13 +506,15 @@ impl GpuRenderer {
                 bounce: counters.bounce,
             });
         }
-        self.gpu.queue.write_buffer(
-            &self.counters,
-            0,
-            bytemuck::bytes_of(&CountersRecord::zeroed()),
-        );
+        self.clear_counters();
         self.gpu.check()?;
         Ok((pixels, tally))
+    }
+
+    fn clear_counters(&self) {
+        let zero = CountersRecord::zeroed();
+        let bytes = bytemuck::bytes_of(&zero);
+        self.gpu.queue.write_buffer(&self.counters, 0, bytes);
     }
 }
 
@@ -575,22 +576,29 @@ impl Renderer for GpuRenderer {
         if tiles.is_some() && !self.kernel.has_binding(15) {
             return Err(Error::Shader("the kernel renders all tiles or none".into()));
         }
-        for (i, region) in self.crop.pieces(self.side).enumerate() {
-            // All regions get the samples that the first one got.
-            let wanted = window.samples.clone();
+        let with_tiles = |region: Rect| {
             let corner = [region.x - self.crop.x, region.y - self.crop.y];
             let chosen = tiles.map(|tiles| ChosenTiles::of(tiles, corner, region));
+            let pixels = chosen_pixels(region, chosen.as_ref());
+            (region, chosen, pixels)
+        };
+        let regions = self.crop.pieces(self.side).map(with_tiles);
+        let regions: Vec<_> = regions.filter(|(_, _, pixels)| *pixels > 0.0).collect();
+        let total: f64 = regions.iter().map(|(_, _, pixels)| pixels).sum();
+        for (i, (region, chosen, pixels)) in regions.into_iter().enumerate() {
+            // All regions get the samples that the first one got.
+            let wanted = window.samples.clone();
             if self.kernel.has_binding(15) {
                 let bits = chosen.unwrap_or(ChosenTiles::all());
                 let bytes = bytemuck::bytes_of(&bits);
                 self.gpu.queue.write_buffer(&self.chosen, 0, bytes);
             }
             let chosen = chosen.as_ref();
-            let rest = self.crop.pixels() as f64 / region.pixels() as f64 - 1.0;
-            let rest = (i == 0).then_some(rest);
+            let rest = (i == 0).then_some(total / pixels - 1.0);
             window.samples.end = self.render_region(region, wanted, chosen, rest, control)?;
             if window.samples.is_empty() {
                 // None of the regions has any.
+                self.clear_counters();
                 window.pixels.fill(PixelSums::default());
                 window.aovs.fill(AovSums::default());
                 window.tally = Tally::default();
@@ -660,6 +668,18 @@ impl RegionTargets {
         let textures: u64 = self.textures.iter().map(texels).sum();
         textures + self.staging.iter().map(wgpu::Buffer::size).sum::<u64>()
     }
+}
+
+fn tiles_of(region: Rect) -> u32 {
+    region.width.div_ceil(TILE) * region.height.div_ceil(TILE)
+}
+
+/// Of a region's pixels about as many as are in chosen tiles: those at its edge may be smaller.
+fn chosen_pixels(region: Rect, chosen: Option<&ChosenTiles>) -> f64 {
+    let tiles = tiles_of(region);
+    let is_chosen = |tile: &u32| chosen.is_none_or(|c| c.has(*tile));
+    let count = (0..tiles).filter(is_chosen).count();
+    region.pixels() as f64 * count as f64 / f64::from(tiles)
 }
 
 /// Longest side of a region: a multiple of the tile's, such that one buffer can hold its partial sums.

@@ -22,9 +22,8 @@ impl Uploads {
         effects: &Effects,
     ) -> Self {
         let mut all: Vec<(u32, &'static str, Vec<u8>)> = Vec::new();
-        if kernel.has_binding(14)
-            && let Some((_, size)) = kernel.struct_members("Light")
-        {
+        if kernel.has_binding(14) {
+            let (_, size) = kernel.struct_members("Light").expect("of binding 14");
             let mut bytes = Vec::new();
             for light in &placement.lights.table {
                 let record = LightRecord::new(light, placement, effects);
