@@ -36,8 +36,8 @@ pub const MOST_WEIGHED: usize = 8;
 
 /// Whether light sampling finds this sphere from outside. Walls (with a pole frame) fill so much of the view
 /// that BSDF sampling finds them as well, and the rest of the scene hides most of them: that both look for them
-/// still costs less for the same error, or in the lecture's scene the same (`benches/RESULTS.md`). Lamps that
-/// only glass can see are left to BSDF sampling.
+/// still costs less for the same error, but a tenth more in the lecture's scene (`benches/RESULTS.md`). Lamps
+/// that only glass can see are left to BSDF sampling.
 fn is_sampled(scene: &Scene, sphere: &PlacedSphere) -> bool {
     let emission = scene.materials[sphere.material].emission;
     sphere.side != Side::Inside && luminance(emission) > 0.0 && !is_sealed(scene, sphere.source)
