@@ -6,7 +6,7 @@ use std::collections::HashMap;
 
 use crate::media::precedes;
 use crate::placement::Side;
-use crate::scene::{MaterialKind, Scene};
+use crate::scene::Scene;
 
 /// Opaque spheres of either side that are looked at as containers: walls and shells are few and large,
 /// and a scene of millions must not take the square of its size.
@@ -143,6 +143,5 @@ fn just_within(scene: &Scene, outer: usize, inner: usize) -> bool {
 }
 
 fn is_dielectric(scene: &Scene, i: usize) -> bool {
-    let material = &scene.materials[scene.spheres[i].material];
-    matches!(material.kind, MaterialKind::Dielectric { .. })
+    scene.materials[scene.spheres[i].material].kind.transmits()
 }

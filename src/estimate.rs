@@ -238,15 +238,11 @@ fn worst_cycle(scene: &Scene, placement: &Placement, k: i32, termination: f64) -
     let cycle = |channel| {
         let factor = |sphere: &PlacedSphere| {
             let kind = &scene.materials[sphere.material].kind;
-            let delta = matches!(
-                kind,
-                MaterialKind::Mirror { .. } | MaterialKind::Dielectric { .. }
-            );
             Factor {
                 factor: moment_factor(kind, channel, k, termination),
                 material: sphere.material,
                 sees_itself: sphere.side != Side::Outside,
-                bounded: delta && termination == 0.0,
+                bounded: kind.is_delta() && termination == 0.0,
             }
         };
         let factors: Vec<Factor> = placement.spheres.iter().map(factor).collect();

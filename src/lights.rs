@@ -3,7 +3,7 @@
 //! Part of the placement: decided once, for both renderers.
 
 use crate::placement::{PlacedSphere, Placement, Side};
-use crate::scene::{MaterialKind, Scene, Sphere, luminance};
+use crate::scene::{Scene, Sphere, luminance};
 use crate::settings::{LightSampling, Offset};
 
 /// A sphere that light sampling can choose.
@@ -47,12 +47,7 @@ fn is_sampled(scene: &Scene, sphere: &PlacedSphere) -> bool {
 /// delta lobes: to every vertex that looks for lights, its surface hides the lamp.
 fn is_sealed(scene: &Scene, lamp: usize) -> bool {
     let kind = |sphere: &Sphere| scene.materials[sphere.material].kind;
-    let smooth = |sphere: &Sphere| {
-        matches!(
-            kind(sphere),
-            MaterialKind::Mirror { .. } | MaterialKind::Dielectric { .. }
-        )
-    };
+    let smooth = |sphere: &Sphere| kind(sphere).is_delta();
     let inner = &scene.spheres[lamp];
     scene.spheres.iter().enumerate().any(|(glass, outer)| {
         let distance = |other: &Sphere| other.center.distance(outer.center);
@@ -62,7 +57,7 @@ fn is_sealed(scene: &Scene, lamp: usize) -> bool {
             !apart && !around
         };
         glass != lamp
-            && matches!(kind(outer), MaterialKind::Dielectric { .. })
+            && kind(outer).transmits()
             && distance(inner) + inner.radius <= outer.radius
             && !scene
                 .spheres

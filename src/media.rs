@@ -7,7 +7,7 @@ use std::cmp::Ordering;
 use glam::DVec3;
 
 use crate::containment::ROUNDING;
-use crate::scene::{MaterialKind, Scene};
+use crate::scene::Scene;
 
 /// The most levels: the kernel keeps the set of media a path is in as the bits of a word.
 pub const MAX_LEVELS: u32 = 32;
@@ -60,14 +60,13 @@ impl Media {
             .iter()
             .enumerate()
             .filter(|(source, _)| reachable[*source])
-            .filter_map(|(source, s)| match scene.materials[s.material].kind {
-                MaterialKind::Dielectric { ior } => Some(Ball {
-                    source,
-                    center: s.center - scene.camera.position,
-                    radius: s.radius,
-                    ior,
-                }),
-                _ => None,
+            .map(|(source, s)| (source, s, &scene.materials[s.material].kind))
+            .filter(|(_, _, kind)| kind.transmits())
+            .map(|(source, s, kind)| Ball {
+                source,
+                center: s.center - scene.camera.position,
+                radius: s.radius,
+                ior: kind.ior(),
             })
             .collect();
         // From low to high precedence.

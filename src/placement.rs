@@ -11,7 +11,7 @@ use glam::DVec3;
 use crate::containment::{ROUNDING, containers, reachable};
 use crate::lights::Lights;
 use crate::media::{Media, Medium};
-use crate::scene::{Handedness, MaterialKind, Scene};
+use crate::scene::{Handedness, Scene};
 use crate::settings::Offset;
 
 /// A scene's spheres and camera as the renderers use them.
@@ -317,8 +317,7 @@ fn side(scene: &Scene, i: usize) -> Side {
     if lens > 0.0 && (distance - sphere.radius).abs() <= lens {
         return Side::Sign;
     }
-    let kind = scene.materials[sphere.material].kind;
-    if matches!(kind, MaterialKind::Dielectric { .. }) {
+    if scene.materials[sphere.material].kind.transmits() {
         Side::Tracked
     } else if distance >= sphere.radius * (1.0 - ROUNDING) {
         // A camera on the surface sees it from outside.

@@ -26,7 +26,7 @@ use crate::effects::Effects;
 use crate::error::{Error, Result};
 use crate::media::MAX_LEVELS;
 use crate::placement::{Placement, Side};
-use crate::scene::{MaterialKind, Scene};
+use crate::scene::Scene;
 use crate::settings::{Offset, Settings};
 
 pub use args::RenderArgs;
@@ -264,10 +264,10 @@ fn check_lens(scene: &Scene, placement: &Placement) -> Result<()> {
     if placement.media.levels == 0 || placement.offset != Offset::Exact {
         return Ok(());
     }
-    let straddled = placement.spheres.iter().find(|s| {
-        let material = &scene.materials[s.material];
-        s.side == Side::Sign && matches!(material.kind, MaterialKind::Dielectric { .. })
-    });
+    let straddled = placement
+        .spheres
+        .iter()
+        .find(|s| s.side == Side::Sign && scene.materials[s.material].kind.transmits());
     match straddled {
         None => Ok(()),
         Some(sphere) => Err(Error::Scene(format!(

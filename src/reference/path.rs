@@ -123,7 +123,7 @@ impl PathTracer<'_> {
             }
             let u = random(result.bounces + 1);
             let vertex = vertex_at(&ray, &hit, sphere);
-            let (level, ior) = (sphere.level, ior_of(&material.kind));
+            let (level, ior) = (sphere.level, material.kind.ior());
             let eta = relative_index(&ray.media, level, ior, hit.inside);
             let s = scatter(
                 &material.kind,
@@ -264,13 +264,6 @@ fn color(kind: &MaterialKind) -> DVec3 {
         MaterialKind::Diffuse { albedo } | MaterialKind::Reflective { albedo, .. } => albedo,
         MaterialKind::Mirror { reflectance } => reflectance,
         MaterialKind::Dielectric { .. } => DVec3::ONE,
-    }
-}
-
-fn ior_of(kind: &MaterialKind) -> f64 {
-    match kind {
-        MaterialKind::Dielectric { ior } => *ior,
-        _ => 1.0,
     }
 }
 

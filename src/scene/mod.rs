@@ -123,6 +123,29 @@ pub enum MaterialKind {
     },
 }
 
+impl MaterialKind {
+    /// Whether paths cross the surface, so that there is a medium on its inner side.
+    #[must_use]
+    pub fn transmits(&self) -> bool {
+        matches!(self, Self::Dielectric { .. })
+    }
+
+    /// Whether it scatters light in delta lobes alone.
+    #[must_use]
+    pub fn is_delta(&self) -> bool {
+        matches!(self, Self::Mirror { .. } | Self::Dielectric { .. })
+    }
+
+    /// Absolute refractive index of the inner side; 1 where paths do not cross the surface.
+    #[must_use]
+    pub fn ior(&self) -> f64 {
+        match self {
+            Self::Dielectric { ior } => *ior,
+            _ => 1.0,
+        }
+    }
+}
+
 /// A sphere.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sphere {

@@ -59,7 +59,7 @@ pub(super) fn scene(file: SceneFile, report: &mut Report) -> Option<Scene> {
             continue;
         };
         used.insert(index);
-        let dielectric = matches!(materials[index].kind, MaterialKind::Dielectric { .. });
+        let dielectric = materials[index].kind.transmits();
         if let Some(priority) = sphere.priority.as_ref().filter(|_| !dielectric) {
             let message = format!(
                 "`priority` needs a dielectric, and `{}` is none",
