@@ -7,7 +7,7 @@ use crate::gpu::device::Gpu;
 use crate::gpu::renderer::GpuRenderer;
 use crate::output::numbers::significant;
 use crate::placement::Placement;
-use crate::reference::path::ReferenceRenderer;
+use crate::reference::renderer::ReferenceRenderer;
 use crate::render::Renderer;
 use crate::scene::Scene;
 use crate::settings::{Rect, Settings};

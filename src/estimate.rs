@@ -1,12 +1,9 @@
 //! Mean and error of a film.
 
-use std::f64::consts::PI;
-
-use glam::DVec3;
-
 use crate::film::Film;
+use crate::materials::MaterialKind;
 use crate::placement::{PlacedSphere, Placement, Side};
-use crate::scene::{MaterialKind, Scene};
+use crate::scene::Scene;
 use crate::settings::{Integrator, Settings};
 
 /// What a film says about the image.
@@ -89,7 +86,7 @@ pub fn energy_cut_at_most(scene: &Scene, film: &Film) -> Option<f64> {
             .map(|sphere| &scene.materials[sphere.material])
     };
     let albedo = used()
-        .map(|material| albedo(&material.kind).max_element())
+        .map(|material| material.kind.albedo().max_element())
         .fold(0.0, f64::max);
     let emitted = used()
         .map(|material| material.emission.max_element())
@@ -103,21 +100,6 @@ pub fn energy_cut_at_most(scene: &Scene, film: &Film) -> Option<f64> {
     }
     let removed = tally.cut_throughput / film.paths() as f64 * albedo * emitted / (1.0 - albedo);
     Some(removed / estimate.mean)
-}
-
-/// The share of the light that a material reflects, at most.
-fn albedo(kind: &MaterialKind) -> DVec3 {
-    match *kind {
-        MaterialKind::Diffuse { albedo } => albedo,
-        MaterialKind::Mirror { reflectance } => reflectance,
-        MaterialKind::Dielectric { .. } => DVec3::ONE,
-        MaterialKind::Reflective {
-            albedo,
-            specular,
-            epsilon,
-            mu,
-        } => albedo + specular * (mu * PI * epsilon * (2.0 - epsilon)),
-    }
 }
 
 /// What is known of a sample's variance before anything is rendered.
@@ -185,30 +167,9 @@ fn harmless_bounces(k: i32, termination: f64) -> u32 {
 }
 
 /// The factor by which an event at a material changes the k-th moment of a path's weight in a colour
-/// channel, at most.
-///
-/// For w = 2 c (rho + pi mu S) within the lobe and 2 c rho elsewhere, c uniform on [0, 1], the mean of
-/// w^k is largest if the lobe, a share of at most epsilon of the hemisphere, is where c is largest.
-/// The survivors, 1 - p of all, are divided by 1 - p.
+/// channel, at most: the survivors, 1 - p of all, are divided by 1 - p.
 fn moment_factor(kind: &MaterialKind, channel: usize, k: i32, termination: f64) -> f64 {
-    let kept = 1.0 - termination;
-    let uniform = 2f64.powi(k) / f64::from(k + 1);
-    let moment = match *kind {
-        MaterialKind::Diffuse { albedo } => uniform * albedo[channel].powi(k),
-        MaterialKind::Mirror { reflectance } => reflectance[channel].powi(k),
-        MaterialKind::Dielectric { .. } => 1.0,
-        MaterialKind::Reflective {
-            albedo,
-            specular,
-            epsilon,
-            mu,
-        } => {
-            let (low, lobe) = (albedo[channel], PI * mu * specular[channel]);
-            let outside = (1.0 - epsilon).powi(k + 1);
-            uniform * (low.powi(k) * outside + (low + lobe).powi(k) * (1.0 - outside))
-        }
-    };
-    moment / kept.powi(k - 1)
+    kind.moment(channel, k) / (1.0 - termination).powi(k - 1)
 }
 
 /// Surfaces between which the moments of weights grow most.
@@ -285,7 +246,7 @@ impl Cycle {
         let of = |m: &usize| {
             let material = &scene.materials[*m];
             let name = material.name.escape_debug();
-            let albedo = albedo(&material.kind)[self.channel];
+            let albedo = material.kind.albedo()[self.channel];
             format!("\"{name}\" (albedo {albedo:.3})")
         };
         let names: Vec<String> = self.materials.iter().map(of).collect();

@@ -42,6 +42,7 @@ pub mod input;
 pub mod intervals;
 pub mod ledger;
 pub mod lights;
+pub mod materials;
 pub mod media;
 pub mod output;
 pub mod placement;

@@ -2,8 +2,9 @@
 //!
 //! Part of the placement: decided once, for both renderers.
 
+use crate::materials::luminance;
 use crate::placement::{PlacedSphere, Placement, Side};
-use crate::scene::{Scene, Sphere, luminance};
+use crate::scene::{Scene, Sphere};
 use crate::settings::{LightSampling, Offset};
 
 /// A sphere that light sampling can choose.
@@ -46,7 +47,7 @@ fn is_sampled(scene: &Scene, sphere: &PlacedSphere) -> bool {
 /// Whether a dielectric is all around `scene.spheres[lamp]`, and nothing in it scatters light but in
 /// delta lobes: to every vertex that looks for lights, its surface hides the lamp.
 fn is_sealed(scene: &Scene, lamp: usize) -> bool {
-    let kind = |sphere: &Sphere| scene.materials[sphere.material].kind;
+    let kind = |sphere: &Sphere| &scene.materials[sphere.material].kind;
     let smooth = |sphere: &Sphere| kind(sphere).is_delta();
     let inner = &scene.spheres[lamp];
     scene.spheres.iter().enumerate().any(|(glass, outer)| {

@@ -19,7 +19,7 @@ use gpu_trace::effects::Effects;
 use gpu_trace::gpu::device::{self, DeviceChoice};
 use gpu_trace::gpu::renderer::GpuRenderer;
 use gpu_trace::placement::Placement;
-use gpu_trace::reference::path::ReferenceRenderer;
+use gpu_trace::reference::renderer::ReferenceRenderer;
 use gpu_trace::render::{Renderer, render_quietly};
 use gpu_trace::scene::{Scene, builtin, load};
 use gpu_trace::settings::Settings;

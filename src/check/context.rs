@@ -6,15 +6,17 @@ use super::Options;
 use crate::effects::Effects;
 use crate::error::Result;
 use crate::film::Film;
+use crate::gpu::bsdf_probe::BsdfProbe;
 use crate::gpu::device::Gpu;
 use crate::gpu::probe::Probe;
 use crate::gpu::renderer::GpuRenderer;
+use crate::materials::MaterialKind;
 use crate::placement::Placement;
-use crate::reference::path::ReferenceRenderer;
+use crate::reference::renderer::ReferenceRenderer;
 use crate::render::render_quietly;
 use crate::scene::Scene;
 use crate::scene::load::load_str;
-use crate::settings::{Offset, Rect, Settings};
+use crate::settings::{Integrator, Offset, Rect, Settings};
 
 /// A device and the options of the suite.
 #[derive(Debug)]
@@ -56,9 +58,20 @@ impl Context {
         let scene = self.scene(EMPTY)?;
         let settings = Settings::for_scene(&scene);
         let placement = Placement::with_offset(&scene, settings.width, settings.height, offset);
-        let names = [effects, exits].concat();
-        let effects = Effects::of(&scene, &placement, &settings, &names);
+        let effects = Effects::named(&[effects, exits, &["baked"]].concat());
         Probe::new(&self.gpu, &scene, &placement, &effects)
+    }
+
+    /// These materials.
+    ///
+    /// # Errors
+    /// If the device fails.
+    pub fn materials(
+        &self,
+        materials: &[MaterialKind],
+        integrator: Integrator,
+    ) -> Result<BsdfProbe> {
+        BsdfProbe::new(&self.gpu, materials, integrator)
     }
 
     /// A scene from its file's text.

@@ -12,10 +12,13 @@ use super::inputs::Random;
 use super::intersection::{Row, ULP, to_row, vector};
 use super::{Case, Measure, Run};
 use crate::error::Result;
+use crate::gpu::bsdf_probe::{BsdfInput, Evaluated, Sampled};
 use crate::gpu::probe::Probe;
-use crate::reference::bsdf::dielectric::fresnel as exact_fresnel;
-use crate::reference::bsdf::reflective::{Reflective, in_lobe, lobe_probability, pdf_reflective};
+use crate::materials::dielectric::{Dielectric, fresnel as exact_fresnel};
+use crate::materials::reflective::Reflective;
+use crate::materials::{Event, MaterialKind, Surface};
 use crate::reference::core::sampling::{basis_around, cap_direction};
+use crate::settings::Integrator;
 
 pub(super) const CASES: &[Case] = &[
     Case {
@@ -233,41 +236,29 @@ fn returned(
     Ok(())
 }
 
-/// A reflective material whose lobe reflects 0.6 of the light, as f32 has it, and the rows of
-/// `sample_reflective` that say so.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Lobe {
-    pub(super) material: Reflective,
-    lobe_weight: f64,
+/// A reflective material whose lobe reflects 0.6 of the light, as f32 has it.
+pub(super) fn glossy(epsilon: f64) -> Reflective {
+    let epsilon = f64::from(epsilon as f32);
+    let cap = PI * epsilon * (2.0 - epsilon);
+    Reflective {
+        albedo: DVec3::splat(0.3f32.into()),
+        specular: DVec3::ONE,
+        epsilon,
+        mu: f64::from((0.6 / cap) as f32),
+    }
 }
 
-impl Lobe {
-    pub(super) fn new(epsilon: f64) -> Self {
-        let epsilon = f64::from(epsilon as f32);
-        let cap = PI * epsilon * (2.0 - epsilon);
-        let mu = f64::from((0.6 / cap) as f32);
-        let material = Reflective {
-            color: DVec3::splat(0.3f32.into()),
-            specular: DVec3::ONE,
-            epsilon,
-            mu,
-        };
-        Self {
-            material,
-            lobe_weight: mu * cap,
-        }
-    }
+/// Such materials from epsilon = 1e-8 to 1.
+fn lobes() -> Vec<Reflective> {
+    const COUNT: u32 = 33;
+    let exponent = |i: u32| -8.0 * f64::from(i) / f64::from(COUNT - 1);
+    (0..COUNT)
+        .map(|i| glossy(10f64.powf(exponent(i))))
+        .collect()
+}
 
-    pub(super) fn rows(&self, n: DVec3, d: DVec3, u: Row) -> [Row; 5] {
-        let m = &self.material;
-        [
-            to_row(m.color, m.epsilon),
-            to_row(m.specular, m.mu),
-            to_row(n, self.lobe_weight),
-            to_row(d, m.color.x),
-            u,
-        ]
-    }
+fn kinds(lobes: &[Reflective]) -> Vec<MaterialKind> {
+    lobes.iter().cloned().map(MaterialKind::from).collect()
 }
 
 fn narrow(context: &Context) -> Result<Measure> {
@@ -310,49 +301,45 @@ fn caps(context: &Context, measure: &mut Measure) -> Result<()> {
 /// The weight f cos/pdf of the direction that came out.
 fn weights(context: &Context, measure: &mut Measure) -> Result<()> {
     let mut random = Random::new("weights");
-    let lobes: Vec<(Lobe, [Row; 5])> = (0..context.size(50_000, 500_000))
+    let lobes = lobes();
+    let inputs: Vec<BsdfInput> = (0..context.size(50_000, 500_000))
         .map(|i| {
-            let lobe = Lobe::new(random.magnitude(-8.0, 0.0));
-            let n = vector(normal(&mut random, i, 0.0));
-            let d = random.direction();
-            let d = if d.dot(n) > 0.0 { -d } else { d };
+            let normal = vector(normal(&mut random, i, 0.0));
+            let wo = random.direction();
+            let wo = if wo.dot(normal) < 0.0 { -wo } else { wo };
             // Grazing ones among them.
             let lift = if i % 4 == 0 {
-                d.dot(n) + random.magnitude(-4.0, -1.0)
+                wo.dot(normal) - random.magnitude(-4.0, -1.0)
             } else {
                 0.0
             };
-            let d = (d - lift * n).normalize();
-            (lobe, lobe.rows(n, d, random.unit4()))
+            let wo = (wo - lift * normal).normalize();
+            let surface = Surface { normal, eta: 1.0 };
+            BsdfInput::new(i % lobes.len(), &surface, wo, random.unit4())
         })
         .collect();
-    let inputs: Vec<[Row; 5]> = lobes.iter().map(|(_, rows)| *rows).collect();
-    let outputs: Vec<[Row; 2]> = context
-        .probe(&["reflective"])?
-        .call("sample_reflective", &inputs)?;
-    for ((lobe, rows), [w, weight]) in lobes.iter().zip(&outputs) {
-        let Some((truth, relative)) = weight_of(&lobe.material, rows, vector(*w)) else {
+    let probe = context.materials(&kinds(&lobes), Integrator::Bsdf)?;
+    for (input, s) in inputs.iter().zip(probe.sample(&inputs)?) {
+        let material = &lobes[input.material as usize];
+        let Some((truth, relative)) = weight_of(material, input, s.wi()) else {
             continue;
         };
         let truth = truth * context.disturbed(1.0e-2);
-        measure.add(
-            (f64::from(weight[0]) / truth - 1.0).abs() / relative,
-            || {
-                let epsilon = lobe.material.epsilon;
-                format!("epsilon {epsilon:e}, {rows:?}: {w:?}, {weight:?} for {truth}")
-            },
-        );
+        measure.add((s.weight().x / truth - 1.0).abs() / relative, || {
+            let epsilon = material.epsilon;
+            format!("epsilon {epsilon:e}, {input:?}: {s:?} for {truth}")
+        });
     }
     Ok(())
 }
 
 /// The weight of direction `w` and its relative error bound; `None` on edges of horizon and lobe
 /// and where the choice between the parts is within rounding: either answer will do.
-fn weight_of(m: &Reflective, rows: &[Row; 5], w: DVec3) -> Option<(f64, f64)> {
-    let (n, d, u) = (vector(rows[2]), vector(rows[3]), f64::from(rows[4][2]));
+fn weight_of(m: &Reflective, input: &BsdfInput, w: DVec3) -> Option<(f64, f64)> {
+    let (n, d, u) = (input.surface().normal, -input.wo(), f64::from(input.u[2]));
     let d_r = d.reflect(n).normalize();
     let (cosine, cos_o) = (n.dot(w), n.dot(d_r));
-    let q = lobe_probability(m, cos_o.max(0.0));
+    let q = m.lobe_probability(cos_o.max(0.0));
     // The cosine of d_r, the products and the ratio.
     let q_error = (REFLECTED + 3.0 * ULP) / cos_o.max(1.0e-9) * q * (1.0 - q) + 8.0 * ULP * q;
     let chosen = u < q;
@@ -361,16 +348,16 @@ fn weight_of(m: &Reflective, rows: &[Row; 5], w: DVec3) -> Option<(f64, f64)> {
     if (u - q).abs() <= q_error || cosine < 1.0e-4 || rim && !chosen {
         return None;
     }
-    let lobe = chosen || in_lobe(m, w, d_r);
-    let pdf = pdf_reflective(m, q, cosine, lobe);
-    let f = m.color.x / PI + if lobe { m.mu } else { 0.0 };
+    let lobe = chosen || m.in_lobe(w, d_r);
+    let value = m.value_of(q, cosine, lobe);
+    let pdf = value.pdf;
     // w came out as it was used: the cosine has 3 roundings, the pdf those of q, 1 - q, the cosine
     // and 4 products; 6 for f and the ratio.
     let cap = if lobe { 1.0 / (TAU * m.epsilon) } else { 0.0 };
     let pdf_error =
         (q_error + ULP) * (cap + cosine / PI) + 3.0 * ULP * (1.0 - q) / PI + 8.0 * ULP * pdf;
     let relative = 2.0 * (3.0 * ULP / cosine + pdf_error / pdf + 6.0 * ULP);
-    Some((cosine / pdf * f, relative))
+    Some((value.f_cos.x / pdf, relative))
 }
 
 fn reciprocity(context: &Context) -> Result<Measure> {
@@ -383,42 +370,53 @@ fn reciprocity(context: &Context) -> Result<Measure> {
 /// Two directions above the surface, half of them near each other's mirror direction.
 fn both_ways(context: &Context, measure: &mut Measure) -> Result<()> {
     let mut random = Random::new("reciprocity");
+    let lobes = lobes();
+    let wrong: Vec<Reflective> = lobes
+        .iter()
+        .map(|m| Reflective {
+            mu: m.mu * context.disturbed(1.0e-2),
+            ..m.clone()
+        })
+        .collect();
     let (mut there, mut back) = (Vec::new(), Vec::new());
     for i in 0..context.size(50_000, 500_000) {
-        let m = Lobe::new(random.magnitude(-8.0, 0.0)).material;
+        let place = i % lobes.len();
         let n = random.direction();
-        let d = random.direction();
-        let d = if d.dot(n) > 0.0 { -d } else { d };
-        let d_r = d.reflect(n);
-        let edge = (2.0 * m.epsilon).sqrt();
-        let w = match i % 2 {
-            0 => (d_r + edge * random.direction()).normalize(),
+        let wo = random.direction();
+        let wo = if wo.dot(n) < 0.0 { -wo } else { wo };
+        let mirrored = (-wo).reflect(n);
+        let edge = (2.0 * lobes[place].epsilon).sqrt();
+        let wi = match i % 2 {
+            0 => (mirrored + edge * random.direction()).normalize(),
             _ => random.direction(),
         };
         // On the edge of the lobe either answer will do.
-        let rim = ((w - d_r).length() - edge).abs() < 2.0 * REFLECTED + 4.0 * ULP * edge;
-        if w.dot(n) <= 0.0 || rim {
+        let rim = ((wi - mirrored).length() - edge).abs() < 2.0 * REFLECTED + 4.0 * ULP * edge;
+        if wi.dot(n) <= 0.0 || rim {
             continue;
         }
-        let rows = |mu: f64, d: DVec3, w: DVec3| -> [Row; 5] {
-            [
-                to_row(m.color, m.epsilon),
-                to_row(m.specular, mu),
-                to_row(n, 0.0),
-                to_row(d, 0.0),
-                to_row(w, 0.0),
-            ]
+        let surface = Surface {
+            normal: n,
+            eta: 1.0,
         };
-        there.push(rows(m.mu, d, w));
-        back.push(rows(m.mu * context.disturbed(1.0e-2), -w, -d));
+        there.push(BsdfInput::new(place, &surface, wo, to_row(wi, 0.0)));
+        back.push(BsdfInput::new(place, &surface, wi, to_row(wo, 0.0)));
     }
-    let probe = context.probe(&["reflective"])?;
-    let forth: Vec<Row> = probe.call("eval_reflective", &there)?;
-    let returned: Vec<Row> = probe.call("eval_reflective", &back)?;
-    for (rows, (a, b)) in there.iter().zip(forth.iter().zip(&returned)) {
-        let (a, b) = (f64::from(a[0]), f64::from(b[0]));
-        measure.add((a / b - 1.0).abs() / 1.0e-5, || {
-            format!("{rows:?}: {a}, {b} the other way round")
+    let probe = context.materials(&kinds(&lobes), Integrator::Bsdf)?;
+    let forth: Vec<Evaluated> = probe.evaluate(&there)?;
+    let probe = context.materials(&kinds(&wrong), Integrator::Bsdf)?;
+    let returned: Vec<Evaluated> = probe.evaluate(&back)?;
+    for (input, (a, b)) in there.iter().zip(forth.iter().zip(&returned)) {
+        let [wo, wi] = [input.wo(), vector(input.u)];
+        let n = input.surface().normal;
+        // The cosines of both, as f32 has them, go out of f cos: 3 roundings each.
+        let (a, b) = (
+            f64::from(a.f_cos[0]) / n.dot(wi),
+            f64::from(b.f_cos[0]) / n.dot(wo),
+        );
+        let bound = 1.0e-5 + 3.0 * ULP * (1.0 / n.dot(wi) + 1.0 / n.dot(wo));
+        measure.add((a / b - 1.0).abs() / bound, || {
+            format!("{input:?}: {a}, {b} the other way round")
         });
     }
     Ok(())
@@ -429,35 +427,39 @@ fn through_glass(context: &Context, measure: &mut Measure) -> Result<()> {
     let mut random = Random::new("glass");
     // Never reflected where there is a choice.
     let u = [0.0, 0.0, 1.0 - (0.5 * ULP) as f32, 0.0];
-    let there: Vec<[Row; 3]> = (0..context.size(50_000, 500_000))
+    let there: Vec<BsdfInput> = (0..context.size(50_000, 500_000))
         .map(|i| {
             let eta = [1.5, 1.0 / 1.5, 2.4f64.powf(random.range(-1.0, 1.0))][i % 3];
-            let (n, d) = (random.direction(), random.direction());
-            let d = if d.dot(n) > 0.0 { -d } else { d };
+            let (normal, wo) = (random.direction(), random.direction());
+            let wo = if wo.dot(normal) < 0.0 { -wo } else { wo };
             let lift = if i % 4 == 0 {
-                d.dot(n) + random.magnitude(-5.0, -1.0)
+                wo.dot(normal) - random.magnitude(-5.0, -1.0)
             } else {
                 0.0
             };
-            [to_row(n, eta), to_row((d - lift * n).normalize(), 0.0), u]
+            let wo = (wo - lift * normal).normalize();
+            BsdfInput::new(0, &Surface { normal, eta }, wo, u)
         })
         .collect();
-    let probe = context.probe(&["dielectric", "interior"])?;
-    let forth: Vec<[Row; 2]> = probe.call("sample_dielectric", &there)?;
-    let crossed: Vec<([Row; 3], [Row; 2])> = std::iter::zip(there, forth)
-        .filter(|(_, s)| s[0][3] != 0.0)
+    let glass = [MaterialKind::from(Dielectric { ior: 1.5 })];
+    let probe = context.materials(&glass, Integrator::Bsdf)?;
+    let crossed: Vec<(BsdfInput, Sampled)> = std::iter::zip(there.iter(), probe.sample(&there)?)
+        .filter(|(_, s)| s.event & Event::TRANSMITTED.bits() != 0)
+        .map(|(input, s)| (*input, s))
         .collect();
     let wrong = context.disturbed(1.0e-2) as f32;
-    let back: Vec<[Row; 3]> = crossed
+    let back: Vec<BsdfInput> = crossed
         .iter()
-        .map(|([n, ..], [w, _])| {
-            let [x, y, z, eta] = *n;
-            [[-x, -y, -z, wrong / eta], [-w[0], -w[1], -w[2], 0.0], u]
+        .map(|(input, s)| BsdfInput {
+            wo: s.wi,
+            normal: input.normal.map(|x| -x),
+            eta: wrong / input.eta,
+            ..*input
         })
         .collect();
-    let returned: Vec<[Row; 2]> = probe.call("sample_dielectric", &back)?;
-    for (([n, d, _], [_, weight]), [w, second]) in crossed.iter().zip(&returned) {
-        let cos_i = -vector(*n).dot(vector(*d));
+    let returned = probe.sample(&back)?;
+    for ((input, s), second) in crossed.iter().zip(&returned) {
+        let cos_i = input.surface().normal.dot(input.wo());
         // The square of the cosine on the way back has some 30 roundings, times up to 2.4^2: within
         // these f32 may find total reflection.
         if cos_i * cos_i < 200.0 * ULP {
@@ -465,10 +467,10 @@ fn through_glass(context: &Context, measure: &mut Measure) -> Result<()> {
         }
         // The component along the surface has some 30 roundings on both ways together, and the
         // direction 1/cos_i times its error.
-        let apart = (vector(*w) + vector(*d)).length() * cos_i;
-        let radiance = f64::from(weight[0]) * f64::from(second[0]) - 1.0;
+        let apart = (second.wi() - input.wo()).length() * cos_i;
+        let radiance = s.weight().x * second.weight().x - 1.0;
         measure.add(apart.max(radiance.abs()) / 1.0e-5, || {
-            format!("n, eta = {n:?}, d = {d:?}: back {w:?}, weights {weight:?}, {second:?}")
+            format!("{input:?}: {s:?}, back {second:?}")
         });
     }
     Ok(())

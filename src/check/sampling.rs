@@ -8,13 +8,17 @@ use rayon::prelude::*;
 use super::context::Context;
 use super::inputs::Random;
 use super::intersection::{Row, to_row, vector};
-use super::materials::{Lobe, REFLECTED};
+use super::materials::{REFLECTED, glossy};
 use super::{Case, Measure, Run};
 use crate::error::Result;
+use crate::gpu::bsdf_probe::{BsdfInput, BsdfProbe, Sampled};
 use crate::gpu::probe::Probe;
-use crate::reference::bsdf::dielectric::fresnel;
-use crate::reference::bsdf::reflective::{in_lobe, lobe_probability, pdf_reflective};
+use crate::materials::dielectric::{Dielectric, fresnel};
+use crate::materials::diffuse::Diffuse;
+use crate::materials::mirror::Mirror;
+use crate::materials::{Event, MaterialKind, Surface};
 use crate::reference::core::sampling::basis_around;
+use crate::settings::Integrator;
 use crate::statistics::{chi_square, normal_p, sidak};
 
 pub(super) const CASES: &[Case] = &[Case {
@@ -58,6 +62,22 @@ fn draw<I: bytemuck::Pod, O: bytemuck::Pod>(
     let count = context.size(100_000, 1_000_000);
     let inputs: Vec<I> = (0..count).map(|_| input(random.unit4())).collect();
     probe.call(function, &inputs)
+}
+
+/// What a material makes of uniform numbers.
+fn drawn(
+    context: &Context,
+    probe: &BsdfProbe,
+    case: &str,
+    surface: &Surface,
+    wo: DVec3,
+) -> Result<Vec<Sampled>> {
+    let mut random = Random::new(&format!("sample {case}"));
+    let count = context.size(100_000, 1_000_000);
+    let inputs: Vec<BsdfInput> = (0..count)
+        .map(|_| BsdfInput::new(0, surface, wo, random.unit4()))
+        .collect();
+    probe.sample(&inputs)
 }
 
 /// Cells of the sphere about an axis: rings between heights 1 - cos, cut into sectors.
@@ -149,19 +169,28 @@ fn normals() -> [DVec3; 2] {
 
 /// Diffuse: cosine about the normal, or the lecture's uniform hemisphere.
 fn diffuse(context: &Context, lecture: bool) -> Result<Vec<Outcome>> {
-    let effects: &[&str] = if lecture {
-        &["diffuse", "lecture"]
-    } else {
-        &["diffuse"]
+    let gray = MaterialKind::from(Diffuse {
+        albedo: DVec3::splat(0.5),
+    });
+    let integrator = match lecture {
+        true => Integrator::Lecture { termination: 0.2 },
+        false => Integrator::Bsdf,
     };
-    let probe = context.probe(effects)?;
+    let probe = context.materials(&[gray], integrator)?;
     let tilt = context.disturbed(0.2) - 1.0;
     let mut outcomes = Vec::new();
     for n in normals() {
         let case = format!("diffuse, lecture {lecture}, n = {n}");
-        let drawn: Vec<[Row; 2]> = draw(context, &probe, "sample_diffuse", &case, |u| {
-            [[0.5; 4], to_row(n, 0.0), u]
-        })?;
+        let drawn = drawn(
+            context,
+            &probe,
+            &case,
+            &Surface {
+                normal: n,
+                eta: 1.0,
+            },
+            n,
+        )?;
         let pdf = |w: DVec3| match (w.dot(n), lecture) {
             (cosine, _) if cosine <= 0.0 => 0.0,
             // Disturbed, both move towards the pole; they still integrate to 1.
@@ -169,7 +198,7 @@ fn diffuse(context: &Context, lecture: bool) -> Result<Vec<Outcome>> {
             (cosine, false) => cosine / PI * (1.0 + tilt * (cosine - 2.0 / 3.0)),
         };
         let cells = Cells::new(n, &[0.0, 1.0, 2.0]);
-        let p = cells.test(drawn.iter().map(|s| Some(vector(s[0]))), pdf);
+        let p = cells.test(drawn.iter().map(|s| Some(s.wi())), pdf);
         outcomes.push((case, p));
     }
     Ok(outcomes)
@@ -197,36 +226,28 @@ fn caps(context: &Context) -> Result<Vec<Outcome>> {
 }
 
 fn reflective(context: &Context) -> Result<Vec<Outcome>> {
-    let probe = context.probe(&["reflective"])?;
-    let n = normals()[1];
-    let tangent = basis_around(n).tangent;
+    let normal = normals()[1];
+    let surface = Surface { normal, eta: 1.0 };
+    let tangent = basis_around(normal).tangent;
     let mut outcomes = Vec::new();
     for &epsilon in context.size(&[0.01][..], &[1.0e-4, 0.01, 0.2]) {
-        let lobe = Lobe::new(epsilon);
-        let mut m = lobe.material;
+        let mut m = glossy(epsilon);
+        let probe = context.materials(&[m.clone().into()], Integrator::Bsdf)?;
         let epsilon = m.epsilon;
         m.mu *= context.disturbed(0.2);
+        let m = MaterialKind::from(m);
         for degrees in ANGLES {
             let (sin, cos) = f64::to_radians(degrees).sin_cos();
-            let d = vector(to_row(sin * tangent - cos * n, 0.0));
+            let wo = vector(to_row(cos * normal - sin * tangent, 0.0));
             let case = format!("reflective, epsilon {epsilon:e}, {degrees} degrees");
-            let drawn: Vec<[Row; 2]> = draw(context, &probe, "sample_reflective", &case, |u| {
-                lobe.rows(n, d, u)
-            })?;
-            let d_r = d.reflect(n).normalize();
-            let q = lobe_probability(&m, n.dot(d_r).max(0.0));
+            let drawn = drawn(context, &probe, &case, &surface, wo)?;
+            let d_r = (-wo).reflect(normal).normalize();
             let cells = Cells::new(d_r, &[0.0, epsilon, 2.0 * epsilon, 1.0, 2.0]);
-            let pdf = |w: DVec3| {
-                let cosine = w.dot(n);
-                if cosine > 0.0 {
-                    pdf_reflective(&m, q, cosine, in_lobe(&m, w, d_r))
-                } else {
-                    0.0
-                }
+            let pdf = |w: DVec3| match w.dot(normal) {
+                cosine if cosine > 0.0 => m.evaluate(&surface, wo, w).pdf,
+                _ => 0.0,
             };
-            let directions = drawn
-                .iter()
-                .map(|[w, weight]| (weight[0] > 0.0).then(|| vector(*w)));
+            let directions = drawn.iter().map(|s| (s.weight[0] > 0.0).then(|| s.wi()));
             outcomes.push((case, cells.test(directions, pdf)));
         }
     }
@@ -235,19 +256,20 @@ fn reflective(context: &Context) -> Result<Vec<Outcome>> {
 
 /// How often glass reflects.
 fn dielectric(context: &Context) -> Result<Vec<Outcome>> {
-    let probe = context.probe(&["dielectric", "interior"])?;
+    let glass = MaterialKind::from(Dielectric { ior: 1.5 });
+    let probe = context.materials(&[glass], Integrator::Bsdf)?;
     let mut outcomes = Vec::new();
-    for eta in [1.5, 1.0 / 1.5] {
+    for eta in [1.5, 1.0 / 1.5].map(|eta| f64::from(eta as f32)) {
         for degrees in ANGLES {
             let (sin, cos) = f64::to_radians(degrees).sin_cos();
-            let n = to_row(DVec3::Z, eta);
-            let d = to_row(DVec3::new(sin, 0.0, -cos), 0.0);
+            let normal = DVec3::Z;
+            let wo = vector(to_row(DVec3::new(-sin, 0.0, cos), 0.0));
             let case = format!("glass, eta {eta}, {degrees} degrees");
-            let drawn: Vec<[Row; 2]> =
-                draw(context, &probe, "sample_dielectric", &case, |u| [n, d, u])?;
+            let drawn = drawn(context, &probe, &case, &Surface { normal, eta }, wo)?;
             let total = drawn.len() as f64;
-            let reflected = drawn.iter().filter(|s| s[0][3] == 0.0).count() as f64;
-            let share = fresnel(f64::from(-d[2]), n[3].into()).reflected;
+            let through = Event::TRANSMITTED.bits();
+            let reflected = drawn.iter().filter(|s| s.event & through == 0).count() as f64;
+            let share = fresnel(wo.z, eta).reflected;
             let p = if share == 1.0 {
                 f64::from(u8::from(reflected == total))
             } else {
@@ -264,24 +286,27 @@ fn dielectric(context: &Context) -> Result<Vec<Outcome>> {
 fn mirror(context: &Context, measure: &mut Measure) -> Result<()> {
     let mut random = Random::new("mirror");
     let shift = (context.disturbed(1.0e-3) - 1.0) * DVec3::X;
-    let inputs: Vec<[Row; 3]> = (0..context.size(10_000, 100_000))
+    let reflectance = [0.9f32, 0.5, 0.25];
+    let inputs: Vec<BsdfInput> = (0..context.size(10_000, 100_000))
         .map(|_| {
-            let (n, d) = (random.direction(), random.direction());
-            let d = if d.dot(n) > 0.0 { -d } else { d };
-            [random.unit4(), to_row(n, 0.0), to_row(d, 0.0)]
+            let (normal, wo) = (random.direction(), random.direction());
+            let wo = if wo.dot(normal) < 0.0 { -wo } else { wo };
+            BsdfInput::new(0, &Surface { normal, eta: 1.0 }, wo, random.unit4())
         })
         .collect();
-    let outputs: Vec<[Row; 2]> = context.probe(&["mirror"])?.call("sample_mirror", &inputs)?;
-    for ([reflectance, n, d], [w, weight]) in inputs.iter().zip(&outputs) {
-        let twin = vector(*d).reflect(vector(*n) + shift).normalize();
-        let error = if reflectance[..3] == weight[..3] {
-            (vector(*w) - twin).length() / REFLECTED
+    let silver = MaterialKind::from(Mirror {
+        reflectance: reflectance.map(f64::from).into(),
+    });
+    let probe = context.materials(&[silver], Integrator::Bsdf)?;
+    for (input, s) in inputs.iter().zip(probe.sample(&inputs)?) {
+        let normal = input.surface().normal + shift;
+        let twin = (-input.wo()).reflect(normal).normalize();
+        let error = if reflectance == s.weight {
+            (s.wi() - twin).length() / REFLECTED
         } else {
             f64::INFINITY
         };
-        measure.add(error, || {
-            format!("mirror, n = {n:?}, d = {d:?}: {w:?}, {weight:?}")
-        });
+        measure.add(error, || format!("mirror, {input:?}: {s:?}"));
     }
     Ok(())
 }

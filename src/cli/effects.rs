@@ -23,11 +23,11 @@ pub(super) fn run(args: &RenderArgs, json: bool) -> Result<()> {
     let lines = kernel.wgsl.lines().count();
     if json {
         let rows: Vec<_> = effects
-            .table()
-            .iter()
-            .map(|e| {
+            .rows()
+            .map(|(row, reasons)| {
+                let (name, what, used) = (row.name, row.what, !reasons.is_empty());
                 serde_json::json!({
-                    "name": e.name, "used": e.used(), "what": e.what, "reasons": e.reasons,
+                    "name": name, "used": used, "what": what, "reasons": reasons,
                 })
             })
             .collect();
@@ -44,19 +44,15 @@ pub(super) fn run(args: &RenderArgs, json: bool) -> Result<()> {
 
 fn table(scene: &str, effects: &Effects, lines: usize) -> String {
     let mut text = format!("{scene}: a kernel of {lines} lines\n\nIn the kernel\n");
-    let width = effects
-        .table()
-        .iter()
-        .map(|e| e.name.len())
-        .max()
-        .unwrap_or(0);
-    for effect in effects.table().iter().filter(|e| e.used()) {
-        let _ = writeln!(text, "  {:width$}  {}", effect.name, effect.what);
-        let _ = writeln!(text, "  {:width$}    for {}", "", effect.reasons.join("; "));
+    let width = effects.rows().map(|(row, _)| row.name.len()).max();
+    let width = width.unwrap_or(0);
+    for (row, reasons) in effects.rows().filter(|(_, r)| !r.is_empty()) {
+        let _ = writeln!(text, "  {:width$}  {}", row.name, row.what);
+        let _ = writeln!(text, "  {:width$}    for {}", "", reasons.join("; "));
     }
     text += "\nLeft out\n";
-    for effect in effects.table().iter().filter(|e| !e.used()) {
-        let _ = writeln!(text, "  {:width$}  {}", effect.name, effect.what);
+    for (row, _) in effects.rows().filter(|(_, r)| r.is_empty()) {
+        let _ = writeln!(text, "  {:width$}  {}", row.name, row.what);
     }
     text
 }

@@ -8,10 +8,11 @@ use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 
 use crate::allocation::{TILE, Tiles};
-use crate::effects::Effects;
+use crate::effects::{Effect, Effects};
 use crate::lights::Light;
+use crate::materials::{Member, MemberValue, forms};
 use crate::placement::{PlacedCamera, PlacedSphere, Placement};
-use crate::scene::{Material, MaterialKind, luminance};
+use crate::scene::Material;
 use crate::settings::Rect;
 
 /// `Sphere` of `shaders/scene/list.wesl`: a sphere about its centre.
@@ -68,7 +69,7 @@ pub(crate) fn light_weight(index: usize, placement: &Placement, effects: &Effect
     placement
         .lights
         .of_sphere(index)
-        .map_or(0.0, |light| match effects.has("table") {
+        .map_or(0.0, |light| match effects.has(Effect::Table) {
             true => light.probability,
             false => light.luminance * placement.light,
         })
@@ -238,132 +239,65 @@ pub struct CountersRecord {
     pub advanced: u32,
 }
 
-/// All that a kernel may want to know of a material, rounded to f32.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// What a kernel may want to know of a material, rounded to f32.
+#[derive(Clone, Debug, PartialEq)]
 pub struct MaterialRecord {
-    color: [f32; 3],
-    kind: u32,
-    emission: [f32; 3],
-    specular: [f32; 3],
-    epsilon: f32,
-    mu: f32,
-    lobe_weight: f32,
-    color_weight: f32,
-    ior: f32,
-}
-
-/// One member of a [`MaterialRecord`].
-enum Member<'a> {
-    Vector(&'a [f32; 3]),
-    Scalar(f32),
-    Unsigned(u32),
+    values: Vec<(Member, MemberValue)>,
 }
 
 impl MaterialRecord {
     /// The record of `material`, emission times `light`.
+    ///
+    /// # Panics
+    /// If the form of the material is not in the list of all forms.
     #[must_use]
     pub fn new(material: &Material, light: f64) -> Self {
-        let vector = |v: DVec3| v.as_vec3().to_array();
-        let mut record = Self {
-            color: [0.0; 3],
-            kind: 0,
-            emission: vector(material.emission * light),
-            specular: [0.0; 3],
-            epsilon: 1.0,
-            mu: 0.0,
-            lobe_weight: 0.0,
-            color_weight: 0.0,
-            ior: 1.0,
-        };
-        match material.kind {
-            MaterialKind::Diffuse { albedo } => record.color = vector(albedo),
-            MaterialKind::Mirror { reflectance } => {
-                record.kind = 1;
-                record.color = vector(reflectance);
-            }
-            MaterialKind::Dielectric { ior } => {
-                record.kind = 2;
-                record.ior = ior as f32;
-            }
-            MaterialKind::Reflective {
-                albedo,
-                specular,
-                epsilon,
-                mu,
-            } => {
-                record.kind = 3;
-                record.color = vector(albedo);
-                record.specular = vector(specular);
-                record.epsilon = epsilon as f32;
-                record.mu = mu as f32;
-                record.lobe_weight = (lobe_albedo(epsilon, mu) * luminance(specular)) as f32;
-                record.color_weight = luminance(albedo) as f32;
-            }
+        let form = material.kind.form();
+        let code = forms().iter().position(|f| *f == form);
+        let code = code.expect("every material is in the list");
+        let common = [
+            (Member::vector("color"), material.kind.color().into()),
+            (Member::word("kind"), MemberValue::Word(code as u32)),
+            (
+                Member::vector("emission"),
+                (material.emission * light).into(),
+            ),
+        ];
+        let own = form.members.iter().copied().zip(material.kind.members());
+        Self {
+            values: common.into_iter().chain(own).collect(),
         }
-        record
     }
 
-    /// The members that a kernel with `effects` has, in its order.
-    pub fn members(effects: &Effects) -> impl Iterator<Item = &'static str> {
-        let reflective = effects.has("reflective");
-        [
-            ("color", true),
-            ("kind", true),
-            ("emission", effects.has("emission")),
-            ("specular", reflective),
-            ("epsilon", reflective),
-            ("mu", reflective),
-            ("lobe_weight", reflective),
-            ("color_weight", reflective),
-            ("ior", effects.has("dielectric")),
-        ]
-        .into_iter()
-        .filter_map(|(name, used)| used.then_some(name))
-    }
-
-    fn member(&self, name: &str) -> Member<'_> {
-        match name {
-            "color" => Member::Vector(&self.color),
-            "kind" => Member::Unsigned(self.kind),
-            "emission" => Member::Vector(&self.emission),
-            "specular" => Member::Vector(&self.specular),
-            "epsilon" => Member::Scalar(self.epsilon),
-            "mu" => Member::Scalar(self.mu),
-            "lobe_weight" => Member::Scalar(self.lobe_weight),
-            "color_weight" => Member::Scalar(self.color_weight),
-            "ior" => Member::Scalar(self.ior),
-            other => unreachable!("no material member {other}"),
-        }
+    /// The value of a member; of one that the material does not have, 0, or 1 for a refractive index.
+    fn value(&self, member: Member) -> MemberValue {
+        let own = self.values.iter().find(|(m, _)| *m == member);
+        own.map_or(member.neutral(), |(_, value)| *value)
     }
 
     /// The member as a WGSL literal.
     #[must_use]
-    pub fn literal(&self, name: &str) -> String {
-        match self.member(name) {
-            Member::Vector([x, y, z]) => format!("vec3f({x:?}f, {y:?}f, {z:?}f)"),
-            Member::Scalar(x) => format!("{x:?}f"),
-            Member::Unsigned(x) => format!("{x}u"),
+    pub fn literal(&self, member: Member) -> String {
+        match self.value(member) {
+            MemberValue::Vector([x, y, z]) => format!("vec3f({x:?}f, {y:?}f, {z:?}f)"),
+            MemberValue::Scalar(x) => format!("{x:?}f"),
+            MemberValue::Word(x) => format!("{x}u"),
         }
     }
 
-    /// The record's bytes in a struct with these member offsets and this size.
+    /// The record's bytes in a struct with these members, at these offsets, and this size.
     #[must_use]
-    pub fn bytes(&self, members: &[(String, u32)], size: u32) -> Vec<u8> {
+    pub fn bytes(&self, members: &[(Member, u32)], size: u32) -> Vec<u8> {
         let mut bytes = vec![0; size as usize];
-        for (name, offset) in members {
-            let value: &[u8] = match &self.member(name) {
-                Member::Vector(v) => bytemuck::cast_slice(&v[..]),
-                Member::Scalar(x) => &x.to_ne_bytes(),
-                Member::Unsigned(x) => &x.to_ne_bytes(),
+        for (member, offset) in members {
+            let value = self.value(*member);
+            let value: &[u8] = match &value {
+                MemberValue::Vector(v) => bytemuck::cast_slice(&v[..]),
+                MemberValue::Scalar(x) => &x.to_ne_bytes(),
+                MemberValue::Word(x) => &x.to_ne_bytes(),
             };
             bytes[*offset as usize..][..value.len()].copy_from_slice(value);
         }
         bytes
     }
-}
-
-/// Albedo of the reflective lobe at normal incidence for specular = 1: its projected solid angle
-/// times mu.
-fn lobe_albedo(epsilon: f64, mu: f64) -> f64 {
-    mu * std::f64::consts::PI * epsilon * (2.0 - epsilon)
 }

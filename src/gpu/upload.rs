@@ -3,12 +3,13 @@
 use wgpu::util::DeviceExt as _;
 
 use crate::containment::MOST_CORES;
-use crate::effects::Effects;
+use crate::effects::{Effect, Effects};
 use crate::error::{Error, Result};
 use crate::gpu::layout::{LightRecord, MaterialRecord, PoleRecord, SphereRecord, light_weight};
+use crate::materials::Member;
 use crate::placement::Placement;
 use crate::scene::Scene;
-use crate::shader::Kernel;
+use crate::shader::{Kernel, material_members};
 
 /// The scene's storage buffers, before they are on the device.
 pub(super) struct Uploads(Vec<(u32, &'static str, Vec<u8>)>);
@@ -31,7 +32,7 @@ impl Uploads {
             }
             all.push((14, "lights", bytes));
         }
-        if effects.has("baked") {
+        if effects.has(Effect::Baked) {
             return Self(all);
         }
         let (poles, centered) = placement.spheres.split_at(placement.poles);
@@ -43,27 +44,30 @@ impl Uploads {
         let mut attributes: Vec<u32> = Vec::new();
         for (index, sphere) in placement.spheres.iter().enumerate() {
             attributes.push(sphere.material as u32);
-            if effects.has("interior") {
+            if effects.has(Effect::Interior) {
                 attributes.push(sphere.side as u32);
             }
-            if effects.has("priority") {
+            if effects.has(Effect::Priority) {
                 attributes.push(sphere.level);
             }
-            if effects.has("nested") {
+            if effects.has(Effect::Nested) {
                 let core = |i: usize| sphere.cores.get(i).copied();
                 let cores = (0..MOST_CORES).map(core);
                 for other in std::iter::once(sphere.container).chain(cores) {
                     attributes.push(other.map_or(u32::MAX, |i| i as u32));
                 }
             }
-            if effects.has("lights") {
+            if effects.has(Effect::Lights) {
                 attributes.push((light_weight(index, placement, effects) as f32).to_bits());
             }
         }
         all.push((0, "spheres", bytemuck::cast_slice(&spheres).to_vec()));
         all.push((1, "poles", bytemuck::cast_slice(&poles).to_vec()));
         all.push((2, "attributes", bytemuck::cast_slice(&attributes).to_vec()));
-        if let Some((members, size)) = kernel.struct_members("Material") {
+        if let Some((offsets, size)) = kernel.struct_members("Material") {
+            let members: Vec<(Member, u32)> = std::iter::zip(material_members(effects), offsets)
+                .map(|(member, (_, offset))| (member, offset))
+                .collect();
             let materials = scene.materials.iter();
             let record = |m| MaterialRecord::new(m, placement.light);
             let bytes = materials.flat_map(|m| record(m).bytes(&members, size));

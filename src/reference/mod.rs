@@ -4,8 +4,9 @@
 //! It is an oracle, written to be read: it takes no shortcut that the kernel takes, has no
 //! geometry form and drops no effect.
 
-pub mod bsdf;
 pub mod core;
 pub mod light;
 pub mod path;
+pub mod purpose;
+pub mod renderer;
 pub mod scene;

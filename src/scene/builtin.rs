@@ -92,8 +92,9 @@ pub fn resolve(argument: Option<&str>) -> Result<Loaded> {
 mod tests {
     use glam::DVec3;
 
-    use super::super::{Handedness, MaterialKind};
+    use super::super::Handedness;
     use super::*;
+    use crate::materials::diffuse::Diffuse;
 
     #[test]
     fn the_default_scene_is_the_lecture() {
@@ -106,7 +107,7 @@ mod tests {
             .find(|m| m.name == "cyan")
             .expect("cyan");
         let albedo = DVec3::new(0.878, 1.0, 1.0);
-        assert_eq!(cyan.kind, MaterialKind::Diffuse { albedo });
+        assert_eq!(cyan.kind, Diffuse { albedo }.into());
         assert_eq!(scene.spheres[4].center.y, 1001.0);
     }
 

@@ -6,23 +6,10 @@ use std::fmt::{self, Write};
 use glam::DVec3;
 
 use super::load::Loaded;
-use super::{Handedness, MaterialKind, Scene};
+use super::{Handedness, Scene};
 
 /// So many lights are listed one by one.
 const LIGHTS_LISTED: usize = 8;
-
-impl MaterialKind {
-    /// The name of the kind in a scene file, which is also the name of its effect.
-    #[must_use]
-    pub fn name(&self) -> &'static str {
-        match self {
-            Self::Diffuse { .. } => "diffuse",
-            Self::Mirror { .. } => "mirror",
-            Self::Dielectric { .. } => "dielectric",
-            Self::Reflective { .. } => "reflective",
-        }
-    }
-}
 
 /// The summary that `scene check` prints: image, camera, spheres by material, lights. Lines end
 /// with a newline; the warnings are not in it.

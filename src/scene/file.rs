@@ -5,16 +5,19 @@
 //! is what the loader enforces. What a schema cannot say, because it concerns two values at once,
 //! is in `scene::validate`.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
+use glam::DVec3;
 use schemars::transform::RecursiveTransform;
-use schemars::{JsonSchema, Schema, generate::SchemaSettings, json_schema};
+use schemars::{JsonSchema, Schema, SchemaGenerator, generate::SchemaSettings, json_schema};
 use serde::Deserialize;
+use serde_json::json;
 use toml::Spanned;
 
-/// The largest magnitude of any number: its square still fits the f64 in which scenes are kept,
-/// and it fits the f32 of the GPU.
-pub const MAX_MAGNITUDE: f64 = 1e20;
+use crate::materials::schema::{MAX_MAGNITUDE, radiance, vector};
+use crate::materials::{MaterialKind, schemas};
+
 /// The largest width and height of an image, in pixels.
 pub const MAX_SIDE: u32 = 65_536;
 /// The largest number of samples a pixel, and the largest sample index.
@@ -126,64 +129,51 @@ pub(super) struct EnvironmentTable {
 }
 
 /// A material: `type` decides which other keys it has. Any material may emit.
-#[derive(Debug, Deserialize, JsonSchema)]
-#[serde(
-    tag = "type",
-    rename_all = "lowercase",
-    rename_all_fields = "snake_case",
-    deny_unknown_fields
-)]
-pub(super) enum MaterialTable {
-    /// Lambert's law: BRDF = albedo/π.
-    Diffuse {
-        /// Share of the light that is scattered.
-        #[schemars(schema_with = "share")]
-        albedo: [f64; 3],
-        /// Radiance emitted on both sides of the surface.
-        #[serde(default)]
-        #[schemars(schema_with = "emission")]
-        emission: [f64; 3],
-    },
-    /// A perfect mirror.
-    Mirror {
-        /// Share of the light that is reflected.
-        #[schemars(schema_with = "share")]
-        reflectance: [f64; 3],
-        /// Radiance emitted on both sides of the surface.
-        #[serde(default)]
-        #[schemars(schema_with = "emission")]
-        emission: [f64; 3],
-    },
-    /// Smooth glass.
-    Dielectric {
-        /// Absolute refractive index (vacuum 1).
-        #[schemars(range(max = MAX_MAGNITUDE), extend("exclusiveMinimum" = 0.0))]
-        ior: f64,
-        /// Radiance emitted on both sides of the surface.
-        #[serde(default)]
-        #[schemars(schema_with = "emission")]
-        emission: [f64; 3],
-    },
-    /// The lecture's reflective material: albedo/π, plus µ · specular within ε of the mirror
-    /// direction.
-    Reflective {
-        /// Albedo of the diffuse part.
-        #[schemars(schema_with = "share")]
-        albedo: [f64; 3],
-        /// Colour of the lobe.
-        #[schemars(schema_with = "share")]
-        specular: [f64; 3],
-        /// Size of the lobe: one minus the cosine of its half-angle.
-        #[schemars(range(max = 1.0), extend("exclusiveMinimum" = 0.0))]
-        epsilon: f64,
-        /// Value of the BRDF in the lobe for specular = 1, in 1/sr.
-        #[schemars(range(min = 0.0, max = MAX_MAGNITUDE))]
-        mu: f64,
-        /// Radiance emitted on both sides of the surface.
-        #[serde(default)]
-        #[schemars(schema_with = "emission")]
-        emission: [f64; 3],
-    },
+#[derive(Debug, Deserialize)]
+pub(super) struct MaterialTable {
+    /// How it scatters light.
+    #[serde(flatten)]
+    pub(super) kind: MaterialKind,
+    /// Radiance emitted on both sides of the surface.
+    #[serde(default)]
+    pub(super) emission: DVec3,
+}
+
+impl JsonSchema for MaterialTable {
+    fn schema_name() -> Cow<'static, str> {
+        "MaterialTable".into()
+    }
+
+    /// One of the materials' schemas, with what all have in common.
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        let mut emission = radiance(generator);
+        emission.insert("default".into(), json!([0.0, 0.0, 0.0]));
+        emission.insert(
+            "description".into(),
+            json!("Radiance emitted on both sides of the surface."),
+        );
+        let with_common = |(name, mut schema): (&str, Schema)| {
+            let object = schema.ensure_object();
+            let properties = object["properties"].as_object_mut();
+            if let Some(properties) = properties {
+                properties.insert("type".into(), json!({ "type": "string", "const": name }));
+                properties.insert("emission".into(), emission.as_value().clone());
+            }
+            let required = object["required"].as_array_mut();
+            if let Some(required) = required {
+                required.insert(0, "type".into());
+            }
+            object.insert("additionalProperties".into(), json!(false));
+            object.remove("title");
+            object.remove("$schema");
+            schema
+        };
+        let variants: Vec<Schema> = schemas(generator).into_iter().map(with_common).collect();
+        json_schema!({
+            "description": "A material: `type` decides which other keys it has. Any material may emit.",
+            "oneOf": variants,
+        })
+    }
 }
 
 /// A sphere.
@@ -206,31 +196,8 @@ pub(super) struct SphereTable {
     pub(super) priority: Option<Spanned<i32>>,
 }
 
-fn vector(minimum: f64, maximum: f64) -> Schema {
-    json_schema!({
-        "type": "array",
-        "items": { "type": "number", "minimum": minimum, "maximum": maximum },
-        "minItems": 3,
-        "maxItems": 3,
-    })
-}
-
-fn point(_: &mut schemars::SchemaGenerator) -> Schema {
+fn point(_: &mut SchemaGenerator) -> Schema {
     vector(-MAX_MAGNITUDE, MAX_MAGNITUDE)
-}
-
-fn share(_: &mut schemars::SchemaGenerator) -> Schema {
-    vector(0.0, 1.0)
-}
-
-fn radiance(_: &mut schemars::SchemaGenerator) -> Schema {
-    vector(0.0, MAX_MAGNITUDE)
-}
-
-fn emission(generator: &mut schemars::SchemaGenerator) -> Schema {
-    let mut schema = radiance(generator);
-    schema.insert("default".to_owned(), serde_json::json!([0.0, 0.0, 0.0]));
-    schema
 }
 
 /// The JSON schema of a scene file (draft 2020-12), without references to follow.

@@ -2,7 +2,8 @@
 
 use glam::DVec3;
 
-use super::{Handedness, MaterialKind, Scene};
+use super::{Handedness, Scene};
+use crate::materials::{MaterialKind, Value};
 
 /// Hash of everything in the scene that the image depends on: 16 hexadecimal digits.
 ///
@@ -74,20 +75,10 @@ impl Fnv {
 
     fn kind(&mut self, kind: &MaterialKind) {
         self.bytes(kind.name().as_bytes());
-        match *kind {
-            MaterialKind::Diffuse { albedo } => self.vector(albedo),
-            MaterialKind::Mirror { reflectance } => self.vector(reflectance),
-            MaterialKind::Dielectric { ior } => self.number(ior),
-            MaterialKind::Reflective {
-                albedo,
-                specular,
-                epsilon,
-                mu,
-            } => {
-                self.vector(albedo);
-                self.vector(specular);
-                self.number(epsilon);
-                self.number(mu);
+        for (_, value) in kind.parameters() {
+            match value {
+                Value::Number(number) => self.number(number),
+                Value::Vector(vector) => self.vector(vector),
             }
         }
     }
@@ -129,10 +120,10 @@ mod tests {
     #[test]
     fn every_value_of_the_image_changes_the_hash() {
         let change = |kind: &mut MaterialKind| match kind {
-            MaterialKind::Diffuse { albedo } => albedo.z += 0.1,
-            MaterialKind::Mirror { reflectance } => reflectance.x += 0.1,
-            MaterialKind::Dielectric { ior } => *ior += 1e-9,
-            MaterialKind::Reflective { mu, .. } => *mu += 1.0,
+            MaterialKind::Diffuse(m) => m.albedo.z += 0.1,
+            MaterialKind::Mirror(m) => m.reflectance.x += 0.1,
+            MaterialKind::Dielectric(m) => m.ior += 1e-9,
+            MaterialKind::Reflective(m) => m.mu += 1.0,
         };
         let changes: [fn(&mut Scene); 14] = [
             |scene| scene.camera.position.x = 1e-300,

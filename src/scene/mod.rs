@@ -18,11 +18,13 @@ mod suggest;
 mod validate;
 
 pub use describe::summary;
-pub use file::{MAX_BOUNCES, MAX_MAGNITUDE, MAX_SIDE, MAX_SPP, json_schema};
+pub use file::{MAX_BOUNCES, MAX_SIDE, MAX_SPP, json_schema};
 pub use hash::content_hash;
 pub use load::Loaded;
 
 use glam::DVec3;
+
+use crate::materials::MaterialKind;
 
 /// A validated scene. Built by the scene loader (`scene::load`) or from the gallery
 /// (`scene::builtin`).
@@ -92,60 +94,6 @@ pub struct Material {
     pub emission: DVec3,
 }
 
-/// How a surface scatters light.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum MaterialKind {
-    /// Lambert's law: BRDF = albedo/π.
-    Diffuse {
-        /// Share of the light that is scattered, in \[0, 1\] per channel.
-        albedo: DVec3,
-    },
-    /// A perfect mirror.
-    Mirror {
-        /// Share of the light that is reflected, in \[0, 1\] per channel.
-        reflectance: DVec3,
-    },
-    /// Smooth glass.
-    Dielectric {
-        /// Absolute refractive index (vacuum 1); positive.
-        ior: f64,
-    },
-    /// The lecture's reflective material: albedo/π plus µ · specular where w·d_r > 1 − ε.
-    Reflective {
-        /// Albedo of the diffuse part, in \[0, 1\] per channel.
-        albedo: DVec3,
-        /// Colour of the lobe, in \[0, 1\] per channel.
-        specular: DVec3,
-        /// Size of the lobe: one minus the cosine of its half-angle, in (0, 1].
-        epsilon: f64,
-        /// Value of the BRDF in the lobe for specular = 1, in 1/sr; not negative.
-        mu: f64,
-    },
-}
-
-impl MaterialKind {
-    /// Whether paths cross the surface, so that there is a medium on its inner side.
-    #[must_use]
-    pub fn transmits(&self) -> bool {
-        matches!(self, Self::Dielectric { .. })
-    }
-
-    /// Whether it scatters light in delta lobes alone.
-    #[must_use]
-    pub fn is_delta(&self) -> bool {
-        matches!(self, Self::Mirror { .. } | Self::Dielectric { .. })
-    }
-
-    /// Absolute refractive index of the inner side; 1 where paths do not cross the surface.
-    #[must_use]
-    pub fn ior(&self) -> f64 {
-        match self {
-            Self::Dielectric { ior } => *ior,
-            _ => 1.0,
-        }
-    }
-}
-
 /// A sphere.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sphere {
@@ -158,10 +106,4 @@ pub struct Sphere {
     /// Which dielectric fills the space where several overlap: the highest wins. `None`: smaller
     /// spheres win over larger ones. Only dielectric spheres may have one.
     pub priority: Option<i32>,
-}
-
-/// Relative luminance of linear RGB (ITU-R BT.709).
-#[must_use]
-pub fn luminance(v: DVec3) -> f64 {
-    v.dot(DVec3::new(0.2126, 0.7152, 0.0722))
 }

@@ -8,10 +8,11 @@ use proptest::prelude::*;
 use super::load::load_str;
 use super::validate::SHORTEST;
 use super::{
-    Camera, Handedness, MAX_BOUNCES, MAX_MAGNITUDE, MAX_SIDE, MAX_SPP, Material, MaterialKind,
-    RenderDefaults, Scene, Sphere,
+    Camera, Handedness, MAX_BOUNCES, MAX_SIDE, MAX_SPP, Material, RenderDefaults, Scene, Sphere,
 };
 use crate::error::Error;
+use crate::materials::schema::MAX_MAGNITUDE;
+use crate::materials::{ALL, MaterialKind, Value};
 
 /// The scene as a scene file. `{:?}` writes the shortest decimal that reads back as the same f64.
 fn to_toml(scene: &Scene) -> String {
@@ -50,23 +51,12 @@ fn to_toml(scene: &Scene) -> String {
             material.kind.name(),
             vector(material.emission)
         ));
-        add(match material.kind {
-            MaterialKind::Diffuse { albedo } => format!("albedo = {}", vector(albedo)),
-            MaterialKind::Mirror { reflectance } => {
-                format!("reflectance = {}", vector(reflectance))
-            }
-            MaterialKind::Dielectric { ior } => format!("ior = {ior:?}"),
-            MaterialKind::Reflective {
-                albedo,
-                specular,
-                epsilon,
-                mu,
-            } => format!(
-                "albedo = {}\nspecular = {}\nepsilon = {epsilon:?}\nmu = {mu:?}",
-                vector(albedo),
-                vector(specular)
-            ),
-        });
+        for (key, value) in material.kind.parameters() {
+            add(match value {
+                Value::Number(number) => format!("{key} = {number:?}"),
+                Value::Vector(v) => format!("{key} = {}", vector(v)),
+            });
+        }
     }
     for sphere in &scene.spheres {
         let name = &scene.materials[sphere.material].name;
@@ -99,28 +89,14 @@ fn three(each: impl Strategy<Value = f64> + Clone) -> impl Strategy<Value = DVec
     [each.clone(), each.clone(), each].prop_map(DVec3::from_array)
 }
 
-fn share() -> impl Strategy<Value = DVec3> {
-    three(prop_oneof![Just(0.0), Just(1.0), 0.0..=1.0].boxed())
-}
-
 fn radiance() -> impl Strategy<Value = DVec3> {
     three(prop_oneof![Just(0.0), positive()].boxed())
 }
 
+/// The test cases of all materials; what their numbers may be is the schema's, and damaged elsewhere.
 fn kind() -> impl Strategy<Value = MaterialKind> {
-    prop_oneof![
-        share().prop_map(|albedo| MaterialKind::Diffuse { albedo }),
-        share().prop_map(|reflectance| MaterialKind::Mirror { reflectance }),
-        positive().prop_map(|ior| MaterialKind::Dielectric { ior }),
-        (share(), share(), 1e-6..=1.0_f64, positive()).prop_map(
-            |(albedo, specular, epsilon, mu)| MaterialKind::Reflective {
-                albedo,
-                specular,
-                epsilon,
-                mu
-            }
-        ),
-    ]
+    let all: Vec<MaterialKind> = ALL.iter().flat_map(|material| (material.cases)()).collect();
+    prop::sample::select(all)
 }
 
 fn camera() -> impl Strategy<Value = Camera> {
@@ -183,7 +159,7 @@ fn scene() -> impl Strategy<Value = Scene> {
                 .into_iter()
                 .map(|(center, radius, material, priority)| {
                     let material = material.index(materials.len());
-                    let glass = matches!(materials[material].kind, MaterialKind::Dielectric { .. });
+                    let glass = materials[material].kind.transmits();
                     Sphere {
                         center,
                         radius,

@@ -4,8 +4,8 @@ use serde_json::Value;
 use toml::Spanned;
 use toml::de::DeValue;
 
-use super::file::MAX_MAGNITUDE;
 use super::report::Problem;
+use crate::materials::schema::MAX_MAGNITUDE;
 
 /// What is wrong with a number's value, if anything.
 pub(super) fn range(name: &str, value: &Spanned<DeValue<'_>>, schema: &Value) -> Option<Problem> {

@@ -1,7 +1,6 @@
 //! From a file whose shape is right to a [`Scene`]: what concerns several values at once.
 
 use std::collections::{BTreeSet, HashMap};
-use std::f64::consts::PI;
 use std::ops::Range;
 
 use glam::DVec3;
@@ -10,7 +9,7 @@ use toml::Spanned;
 use super::file::{CameraTable, HandednessName, MaterialTable, SceneFile, SphereTable};
 use super::report::{Problem, Report};
 use super::suggest::{list, nearest};
-use super::{Camera, Handedness, Material, MaterialKind, RenderDefaults, Scene, Sphere};
+use super::{Camera, Handedness, Material, RenderDefaults, Scene, Sphere};
 
 /// Directions whose angle has a smaller sine are parallel: of the sixteen digits of an f64 the
 /// cross product keeps half, which is what the f32 of the GPU needs.
@@ -19,10 +18,6 @@ const PARALLEL: f64 = 1e-8;
 /// Below this length a vector's square, and that of its product with a direction that is hardly not
 /// parallel, is lost in an f64. Times the largest length, its inverse is still an f64.
 pub(super) const SHORTEST: f64 = 1e-140;
-
-/// A material may reflect this much more than everything without a warning: the lecture's ε = 0.01,
-/// µ = 10 with albedo 0.375 reflects 1.00018 and counts as energy-conserving.
-const ENERGY_SLACK: f64 = 5e-4;
 
 /// At most so many material names are listed in a message.
 const NAMES_LISTED: usize = 12;
@@ -35,7 +30,7 @@ pub(super) fn scene(file: SceneFile, report: &mut Report) -> Option<Scene> {
         .into_iter()
         .map(|(name, table)| {
             let span = name.span();
-            (span, material(name.into_inner(), &table))
+            (span, material(name.into_inner(), table))
         })
         .collect();
     // The map is ordered by name; the order of the file is what people expect to see.
@@ -239,44 +234,11 @@ fn vector(values: [f64; 3]) -> DVec3 {
     DVec3::from_array(values) + 0.0
 }
 
-fn material(name: String, table: &MaterialTable) -> Material {
-    let (kind, emission) = match *table {
-        MaterialTable::Diffuse { albedo, emission } => {
-            let albedo = vector(albedo);
-            (MaterialKind::Diffuse { albedo }, emission)
-        }
-        MaterialTable::Mirror {
-            reflectance,
-            emission,
-        } => {
-            let reflectance = vector(reflectance);
-            (MaterialKind::Mirror { reflectance }, emission)
-        }
-        MaterialTable::Dielectric { ior, emission } => (MaterialKind::Dielectric { ior }, emission),
-        MaterialTable::Reflective {
-            albedo,
-            specular,
-            epsilon,
-            mu,
-            emission,
-        } => {
-            let (albedo, specular) = (vector(albedo), vector(specular));
-            let mu = mu + 0.0;
-            (
-                MaterialKind::Reflective {
-                    albedo,
-                    specular,
-                    epsilon,
-                    mu,
-                },
-                emission,
-            )
-        }
-    };
+fn material(name: String, table: MaterialTable) -> Material {
     Material {
         name,
-        kind,
-        emission: vector(emission),
+        kind: table.kind,
+        emission: table.emission + 0.0,
     }
 }
 
@@ -325,25 +287,9 @@ fn warn(scene: &Scene, spans: &[Range<usize>], used: &BTreeSet<usize>, report: &
             );
             warnings.push(Problem::new(span.clone(), message, ""));
         }
-        if let MaterialKind::Reflective {
-            albedo,
-            specular,
-            epsilon,
-            mu,
-        } = material.kind
-        {
-            let lobe = mu * PI * (2.0 * epsilon - epsilon * epsilon);
-            let total = (albedo + lobe * specular).max_element();
-            if total > 1.0 + ENERGY_SLACK {
-                let message = format!(
-                    "material \"{}\" gains energy: it reflects up to {total:.3} times the light",
-                    material.name.escape_debug()
-                );
-                warnings.push(Problem::new(span.clone(), message, "").help(format!(
-                    "albedo + {lobe:.3} specular must be at most 1 in each channel, \
-                     where {lobe:.3} = mu pi (2 epsilon - epsilon^2)"
-                )));
-            }
+        if let Some([what, help]) = material.kind.warning() {
+            let message = format!("material \"{}\" {what}", material.name.escape_debug());
+            warnings.push(Problem::new(span.clone(), message, "").help(help));
         }
     }
 }

@@ -5,7 +5,8 @@ use std::fmt::Write as _;
 
 use glam::DVec3;
 
-use crate::effects::Effects;
+use super::bsdf::members;
+use crate::effects::{Effect, Effects};
 use crate::gpu::layout::{MaterialRecord, light_weight};
 use crate::placement::{PlacedSphere, Placement, Side};
 use crate::scene::Scene;
@@ -23,45 +24,48 @@ pub(super) fn vector(v: DVec3) -> String {
 pub(super) fn geometry(scene: &Scene, placement: &Placement, effects: &Effects) -> String {
     let mut text = String::from(
         "import package::scene::ray::{Ray, Hit, Frame, NO_HIT, NO_SPHERE};\n\
-         import package::scene::material::Material;\n",
+         import package::bsdf::Material;\n",
     );
     let centered = placement.spheres.iter().any(|s| s.pole.is_none());
     if centered {
         text += "import package::scene::sphere::sphere_quadratic;\n";
     }
-    if effects.has("pole") && placement.poles > 0 {
+    if effects.has(Effect::Pole) && placement.poles > 0 {
         text += "import package::scene::sphere::pole_quadratic;\n";
     }
     let any = |sides: &[Side]| placement.spheres.iter().any(|s| sides.contains(&s.side));
     for (used, name) in [
-        (any(&[Side::Outside]), "sphere::root_outside"),
-        (any(&[Side::Inside]), "sphere::root_interior"),
-        (any(&[Side::Tracked, Side::Sign]), "sphere::root_from"),
-        (any(&[Side::Tracked]), "ray::is_within"),
+        (any(&[Side::Outside]), "scene::sphere::root_outside"),
+        (any(&[Side::Inside]), "scene::sphere::root_interior"),
+        (
+            any(&[Side::Tracked, Side::Sign]),
+            "scene::sphere::root_from",
+        ),
+        (any(&[Side::Tracked]), "media::is_within"),
     ] {
         if used {
-            text += &format!("import package::scene::{name};\n");
+            text += &format!("import package::{name};\n");
         }
     }
-    if effects.has("lights") && !effects.has("table") {
+    if effects.weighs_lights() {
         text += "import package::scene::ray::Vertex;\n\
-                 import package::light::sphere::{Weighed, weigh};\n\
+                 import package::lights::{Weighed, weigh};\n\
                  import package::light::aim::aim_center;\n";
-        if effects.has("pole") {
+        if effects.has(Effect::Pole) {
             text += "import package::light::aim::aim_pole;\n";
         }
     }
     closest_hit(&mut text, placement, effects);
     frame_of(&mut text, placement, effects);
     material_of(&mut text, scene, placement, effects);
-    if effects.has("lights") {
+    if effects.has(Effect::Lights) {
         light_weights(&mut text, placement, effects);
     }
     text
 }
 
 fn closest_hit(text: &mut String, placement: &Placement, effects: &Effects) {
-    let interior = effects.has("interior");
+    let interior = effects.has(Effect::Interior);
     *text += "fn closest_hit(ray: Ray) -> Hit {\n\
               let dd = dot(ray.direction, ray.direction);\n\
               var hit: Hit;\nhit.t = NO_HIT;\nhit.index = NO_SPHERE;\n";
@@ -80,7 +84,7 @@ fn closest_hit(text: &mut String, placement: &Placement, effects: &Effects) {
         let inside = match sphere.side {
             Side::Outside => "false".to_owned(),
             Side::Inside => "true".to_owned(),
-            Side::Tracked => within(placement, effects, i),
+            Side::Tracked => within(placement, i),
             Side::Sign => "select(q.c < 0.0, ray.inward, own)".to_owned(),
         };
         let root = match sphere.side {
@@ -115,23 +119,19 @@ fn closest_hit(text: &mut String, placement: &Placement, effects: &Effects) {
 }
 
 /// Whether the ray runs inside the dielectric `index`.
-fn within(placement: &Placement, effects: &Effects, index: usize) -> String {
-    if effects.has("priority") {
-        let level = placement.spheres[index].level;
-        format!("is_within(ray, {index}u, {level}u)")
-    } else {
-        format!("is_within(ray, {index}u)")
-    }
+fn within(placement: &Placement, index: usize) -> String {
+    let level = placement.spheres[index].level;
+    format!("is_within(ray.media, {index}u, {level}u)")
 }
 
 /// When a sphere can be hit that lies just within another, or has one just within it; see
 /// `nested_reach` in `shaders/scene/list.wesl`.
 fn nested_reach(placement: &Placement, effects: &Effects, sphere: &PlacedSphere) -> Option<String> {
-    let container = sphere.container.map(|c| within(placement, effects, c));
+    let container = sphere.container.map(|c| within(placement, c));
     let cores = sphere.cores.iter();
-    let core = cores.map(|c| format!("!{}", within(placement, effects, *c)));
+    let core = cores.map(|c| format!("!{}", within(placement, *c)));
     let conditions: Vec<String> = container.into_iter().chain(core).collect();
-    (effects.has("nested") && !conditions.is_empty()).then(|| conditions.join(" && "))
+    (effects.has(Effect::Nested) && !conditions.is_empty()).then(|| conditions.join(" && "))
 }
 
 /// Writes `target`, whose value depends on the sphere, as a chain of selections. The most common
@@ -166,7 +166,7 @@ fn frame_of(text: &mut String, placement: &Placement, effects: &Effects) {
     *text += "fn frame_of(index: u32) -> Frame {\nvar frame: Frame;\n";
     choose(text, "frame.anchor", &each(&|s| vector(s.anchor)));
     choose(text, "frame.curvature", &each(&|s| number(1.0 / s.radius)));
-    if effects.has("pole") {
+    if effects.has(Effect::Pole) {
         choose(
             text,
             "frame.pole",
@@ -188,12 +188,12 @@ fn material_of(text: &mut String, scene: &Scene, placement: &Placement, effects:
         .map(|s| MaterialRecord::new(&scene.materials[s.material], placement.light))
         .collect();
     *text += "fn material_of(index: u32) -> Material {\nvar material: Material;\n";
-    for name in MaterialRecord::members(effects) {
-        let values: Vec<String> = records.iter().map(|r| r.literal(name)).collect();
-        choose(text, &format!("material.{name}"), &values);
+    for member in members(effects) {
+        let values: Vec<String> = records.iter().map(|r| r.literal(member)).collect();
+        choose(text, &format!("material.{}", member.name), &values);
     }
     *text += "return material;\n}\n";
-    if effects.has("priority") {
+    if effects.transmits() {
         let levels: Vec<String> = placement
             .spheres
             .iter()
@@ -212,7 +212,7 @@ fn light_weights(text: &mut String, placement: &Placement, effects: &Effects) {
     *text += "fn light_weight(index: u32) -> f32 {\nvar weight: f32;\n";
     choose(text, "weight", &weights);
     *text += "return weight;\n}\n";
-    if effects.has("table") {
+    if !effects.weighs_lights() {
         return;
     }
     *text += "fn weigh_lights(vertex: Vertex, own: u32, u: f32) -> Weighed {\n\

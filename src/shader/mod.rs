@@ -3,12 +3,16 @@
 //! The only module that knows WESL.
 
 mod baked;
+mod bsdf;
 mod sources;
+
+pub(crate) use bsdf::members as material_members;
 
 use wesl::{ManglerKind, ModulePath, VirtualResolver, Wesl};
 
-use crate::effects::Effects;
+use crate::effects::{Effect, Effects, Role};
 use crate::error::{Error, Result};
+use crate::materials;
 use crate::media::Medium;
 use crate::placement::Placement;
 use crate::scene::Scene;
@@ -78,13 +82,24 @@ pub fn link(
     for (path, text) in sources::ALL {
         resolver.add_module(module_path(path), (*text).into());
     }
+    for material in materials::ALL {
+        let path = format!("materials/{}", material.module);
+        resolver.add_module(module_path(&path), material.wesl.into());
+    }
+    for Role { name, file } in effects.roles() {
+        let source = sources::ALL.iter().find(|(path, _)| Some(*path) == file);
+        if let Some((_, text)) = source {
+            resolver.add_module(module_path(name), (*text).into());
+        }
+    }
+    resolver.add_module(module_path("bsdf"), bsdf::module(effects).into());
     resolver.add_module(
         module_path("config"),
         config(scene, placement, effects).into(),
     );
-    if effects.has("baked") {
+    if effects.has(Effect::Baked) {
         let text = baked::geometry(scene, placement, effects);
-        resolver.add_module(module_path("scene/baked"), text.into());
+        resolver.add_module(module_path("geometry"), text.into());
     }
     let mut compiler = Wesl::new_barebones().set_custom_resolver(resolver);
     compiler
@@ -150,21 +165,21 @@ pub const LOOP_ITERATIONS: u64 = 65_000;
 /// Loop iterations that the kernel makes for one ray.
 #[must_use]
 pub fn ray_steps(placement: &Placement, effects: &Effects) -> u32 {
-    if effects.has("baked") {
+    if effects.has(Effect::Baked) {
         return 1;
     }
     let others = placement.spheres.len() - placement.poles;
     // One a pole sphere, one for eight others, and one to leave each loop; with light sampling there
     // are two rays a vertex.
     let ray = placement.poles + others.div_ceil(8) + 2;
-    let rays = if effects.has("lights") { 2 } else { 1 };
+    let rays = if effects.has(Effect::Lights) { 2 } else { 1 };
     // And the path loop's own.
     (rays * ray + 1 + light_steps(placement, effects)) as u32
 }
 
 /// Loop iterations to choose a light, with one to leave the loop.
 fn light_steps(placement: &Placement, effects: &Effects) -> usize {
-    if effects.has("lights") && effects.has("list") && !effects.has("table") {
+    if effects.weighs_lights() && effects.has(Effect::List) {
         placement.lights.table.len() + 1
     } else {
         0
@@ -174,9 +189,9 @@ fn light_steps(placement: &Placement, effects: &Effects) -> usize {
 /// The module `config`: sizes and constants of this scene.
 fn config(scene: &Scene, placement: &Placement, effects: &Effects) -> String {
     let mut text = String::new();
-    if effects.has("list") {
+    if effects.has(Effect::List) {
         text += &format!("const SPHERE_COUNT: u32 = {}u;\n", placement.spheres.len());
-        if effects.has("pole") {
+        if effects.has(Effect::Pole) {
             text += &format!("const POLE_COUNT: u32 = {}u;\n", placement.poles);
         }
     }
@@ -184,15 +199,15 @@ fn config(scene: &Scene, placement: &Placement, effects: &Effects) -> String {
         "const RAY_STEPS: u32 = {}u;\n",
         ray_steps(placement, effects)
     );
-    if effects.has("environment") {
+    if effects.has(Effect::Environment) {
         let radiance = scene.environment.unwrap_or_default() * placement.light;
         text += &format!("const ENVIRONMENT: vec3f = {};\n", baked::vector(radiance));
     }
-    if effects.has("lights") {
+    if effects.has(Effect::Lights) {
         let count = placement.lights.table.len().max(1);
         text += &format!("const LIGHT_COUNT: u32 = {count}u;\n");
     }
-    if effects.has("nudge") {
+    if effects.has(Effect::Nudge) {
         let [back, out] = placement.offset.distances().unwrap_or_default();
         text += &format!(
             "const NUDGE_BACK: f32 = {};\nconst NUDGE_OUT: f32 = {};\n",
@@ -211,8 +226,8 @@ fn initial_media(placement: &Placement, effects: &Effects) -> String {
         let index = medium.map_or(u32::MAX, |m| m.sphere as u32);
         format!("{index}u")
     };
-    if !effects.has("priority") {
-        return if effects.has("dielectric") {
+    if !effects.has(Effect::Priority) {
+        return if effects.transmits() {
             format!("const INITIAL_WITHIN: u32 = {};\n", sphere(camera.first()))
         } else {
             String::new()

@@ -12,7 +12,7 @@ use gpu_trace::gpu::probe::Probe;
 use gpu_trace::gpu::renderer::GpuRenderer;
 use gpu_trace::placement::Placement;
 use gpu_trace::reference::light::aim::{Aim, aim_pole};
-use gpu_trace::reference::path::ReferenceRenderer;
+use gpu_trace::reference::renderer::ReferenceRenderer;
 use gpu_trace::render::render_quietly;
 use gpu_trace::scene::Scene;
 use gpu_trace::scene::load::{load_file, load_str};

@@ -1,4 +1,4 @@
-//! Twin of `shaders/light/sphere.wesl`.
+//! Twin of `shaders/light/light.wesl`, `weighed.wesl`, `table.wesl` and `mis.wesl`.
 
 use std::f64::consts::TAU;
 
@@ -25,10 +25,10 @@ pub fn light_from_table(lights: &Lights, u: [f64; 2]) -> Option<&Light> {
     }
 }
 
-/// For MIS, the density in solid angle with which light sampling finds a direction to `light`; `reach` as
+/// For MIS, the pdf in solid angle with which light sampling finds a direction to `light`; `reach` as
 /// in the kernel, `None` where lights are drawn from the table.
 #[must_use]
-pub fn light_density(light: &Light, aim: &Aim, reach: Option<f64>) -> f64 {
+pub fn light_pdf(light: &Light, aim: &Aim, reach: Option<f64>) -> f64 {
     if !aim.outside {
         return 0.0;
     }
@@ -57,9 +57,9 @@ pub fn sample_cone(aim: &Aim, u: DVec2) -> Option<(DVec3, f64)> {
 #[derive(Clone, Copy, Debug)]
 #[expect(missing_docs, reason = "the members are those of the kernel's struct")]
 pub struct LightSample {
-    pub direction: DVec3,
-    pub density: f64,
-    pub rival: f64,
+    pub wi: DVec3,
+    pub pdf: f64,
+    pub mis_pdf: f64,
     pub limb: f64,
     pub sphere: usize,
     pub reach: f64,
@@ -85,7 +85,7 @@ pub fn sample_light(
     }
     let light = light_from_table(lights, [u[2], u[3]])?;
     let aim = to(light);
-    let (direction, density) = match sampling {
+    let (direction, pdf) = match sampling {
         LightSampling::Cone => sample_cone(&aim, place)?,
         LightSampling::Projected => {
             let cap = cap_seen(&aim, vertex.normal);
@@ -97,9 +97,9 @@ pub fn sample_light(
         }
     };
     (light.sphere != own).then(|| LightSample {
-        direction,
-        density: light.probability * density,
-        rival: light_density(light, &aim, None),
+        wi: direction,
+        pdf: light.probability * pdf,
+        mis_pdf: light_pdf(light, &aim, None),
         limb: limb_distance(&aim, direction),
         sphere: light.sphere,
         reach: 0.0,
@@ -142,18 +142,18 @@ fn weighed_light(
     let (direction, extent) = sample_cap(&cap, vertex.normal, DVec2::new(u[0], u[1]));
     let cosine = vertex.normal.dot(direction).max(0.0);
     Some(LightSample {
-        direction,
-        density: strength * reach * cosine / extent,
-        rival: light.luminance * reach * cosine,
+        wi: direction,
+        pdf: strength * reach * cosine / extent,
+        mis_pdf: light.luminance * reach * cosine,
         limb: limb_distance(&cap.aim, direction),
         sphere: light.sphere,
         reach,
     })
 }
 
-/// Weight of an estimate whose direction has density `a`, against another way with density `b`.
+/// Weight of an estimate whose direction has the pdf `a`, against another way with the pdf `b`.
 #[must_use]
-pub fn power_weight(a: f64, b: f64) -> f64 {
+pub fn mis_weight(a: f64, b: f64) -> f64 {
     let ratio = b / a;
     1.0 / (1.0 + ratio * ratio)
 }

@@ -4,7 +4,6 @@ use glam::DVec3;
 
 use super::priority::Media;
 use crate::placement::PlacedSphere;
-use crate::reference::bsdf::sample::BsdfSample;
 use crate::settings::Offset;
 
 /// A ray; see the kernel's source for the members.
@@ -58,22 +57,29 @@ pub fn vertex_at(ray: &Ray, hit: &Hit, sphere: &PlacedSphere) -> Vertex {
     }
 }
 
-/// The ray that goes on from a vertex. Whoever crosses a dielectric's surface changes its `media`.
+/// The ray that goes on from a vertex; crossed: through the surface, in which case its media change.
 #[must_use]
-pub fn leave(arrived: Ray, hit: &Hit, vertex: &Vertex, s: &BsdfSample, offset: Offset) -> Ray {
+pub fn leave(
+    arrived: Ray,
+    hit: &Hit,
+    vertex: &Vertex,
+    direction: DVec3,
+    crossed: bool,
+    offset: Offset,
+) -> Ray {
     let mut ray = Ray {
         anchor: vertex.anchor,
         offset: vertex.offset,
-        direction: s.direction,
+        direction,
         own: Some(hit.index),
-        inward: hit.inside != s.crossed,
+        inward: hit.inside != crossed,
         media: arrived.media,
     };
     if offset == Offset::Exact {
         return ray;
     }
     let point = arrived.anchor + (arrived.offset + hit.t * arrived.direction);
-    let out = if s.crossed {
+    let out = if crossed {
         -vertex.normal
     } else {
         vertex.normal

@@ -1,0 +1,145 @@
+//! Effects of where spheres, paths and the camera are.
+
+use super::{Effect, Row, when};
+use crate::placement::Side;
+use crate::settings::{GeometryChoice, Offset};
+
+/// Spheres up to which they are baked into the kernel as constants: measured, see
+/// `benches/RESULTS.md`.
+pub const BAKED_LIMIT: usize = 64;
+
+/// Most spheres that can be baked at all: beyond, compiling takes minutes.
+pub const BAKED_MOST: usize = 256;
+
+pub(super) fn rows() -> Vec<Row> {
+    vec![
+        form(true).excludes([Effect::List]),
+        form(false).marks(["FIRST_CENTERED", "Attributes", "spheres"]),
+        Row::new(
+            Effect::Pole,
+            "pole",
+            "frames at the poles of spheres much larger than what is near them",
+            |asked| asked.placed(|s| s.pole.map(|_| "")),
+        )
+        .marks([
+            "pole",
+            "pole_quadratic",
+            "aim_pole",
+            "Pole",
+            "poles",
+            "POLE_COUNT",
+        ]),
+        Row::new(
+            Effect::Interior,
+            "interior",
+            "paths inside spheres",
+            |asked| {
+                asked.placed(|s| match s.side {
+                    Side::Outside => None,
+                    Side::Inside => Some(", which the camera is in"),
+                    Side::Tracked => Some(", which has two sides"),
+                    Side::Sign => Some(", which paths may be on both sides of"),
+                })
+            },
+        )
+        .marks([
+            "root_interior",
+            "root_from",
+            "inside",
+            "INSIDE",
+            "is_inside",
+        ]),
+        Row::new(
+            Effect::Straddle,
+            "straddle",
+            "surfaces of which only a sign tells on which side a path is",
+            |asked| {
+                if asked.settings.offset == Offset::Exact {
+                    return asked.placed(|s| {
+                        (s.side == Side::Sign).then_some(", which the lens is on both sides of")
+                    });
+                }
+                let offset = asked.settings.offset;
+                when(!asked.placement.spheres.is_empty(), || {
+                    format!("--offset {offset}")
+                })
+            },
+        )
+        .needs([Effect::Interior])
+        .needs([Effect::Lens, Effect::Nudge, Effect::Ulp])
+        .marks(["inward", "SIGN"]),
+        Row::new(
+            Effect::Nested,
+            "nested",
+            "surfaces just within those of dielectrics",
+            |asked| asked.placed(|s| s.container.map(|_| ", which lies just within a dielectric")),
+        )
+        .needs([Effect::Interior])
+        .excludes([Effect::Nudge, Effect::Ulp])
+        .marks([
+            "nested_reach",
+            "container",
+            "core0",
+            "core1",
+            "core2",
+            "core3",
+        ]),
+        Row::new(
+            Effect::Nudge,
+            "nudge",
+            "hits as points, moved off the surface by a distance",
+            |asked| {
+                let offset = asked.settings.offset;
+                when(offset.distances().is_some(), || {
+                    format!("--offset {offset}")
+                })
+            },
+        )
+        .needs([Effect::Straddle])
+        .excludes([Effect::Ulp])
+        .marks(["NUDGE_BACK", "NUDGE_OUT"]),
+        Row::new(
+            Effect::Ulp,
+            "ulp",
+            "hits as points, moved off the surface by some ulp",
+            |asked| {
+                let offset = asked.settings.offset;
+                when(offset == Offset::Ulp, || format!("--offset {offset}"))
+            },
+        )
+        .needs([Effect::Straddle])
+        .marks(["ulp_away"]),
+        Row::new(Effect::Lens, "lens", "a thin lens", |asked| {
+            let radius = asked.scene.camera.aperture_radius;
+            when(radius > 0.0, || {
+                format!("camera: aperture_radius = {radius}")
+            })
+        })
+        .marks(["lens_across", "lens_down", "lens_share", "focus"]),
+    ]
+}
+
+/// The form of the geometry.
+fn form(baked: bool) -> Row {
+    let (effect, name, what) = if baked {
+        (Effect::Baked, "baked", "spheres as constants in the kernel")
+    } else {
+        (
+            Effect::List,
+            "list",
+            "a loop over spheres in a storage buffer",
+        )
+    };
+    Row::new(effect, name, what, move |asked| {
+        let count = asked.placement.spheres.len();
+        let (chosen, why) = match asked.settings.geometry {
+            GeometryChoice::Auto => (
+                count <= BAKED_LIMIT,
+                format!("{count} spheres; baked up to {BAKED_LIMIT}"),
+            ),
+            GeometryChoice::Baked => (true, "--geometry baked".into()),
+            GeometryChoice::List => (false, "--geometry list".into()),
+        };
+        when(chosen == baked, || why)
+    })
+}

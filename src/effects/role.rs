@@ -1,0 +1,54 @@
+//! Roles: modules of the kernel that several files can play.
+
+use super::{Effect, Effects};
+
+/// A module name that the kernel's sources import, and the file that stands for it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Role {
+    /// Its name: `package::NAME`.
+    pub name: &'static str,
+    /// The file below `shaders/`, without extension; `None`: written for the scene, or nothing asks for it.
+    pub file: Option<&'static str>,
+}
+
+impl Effects {
+    /// Which file plays which role.
+    #[must_use]
+    pub fn roles(&self) -> [Role; 6] {
+        let has = |effect| self.has(effect);
+        let geometry = (!has(Effect::Baked)).then_some("scene/list");
+        let media = match (self.transmits(), has(Effect::Priority)) {
+            (false, _) => None,
+            (true, false) => Some("scene/media/single"),
+            (true, true) => Some("scene/media/nested"),
+        };
+        let sampler = match has(Effect::Sobol) {
+            true => "sampler/sobol",
+            false => "sampler/independent",
+        };
+        let lights = match (has(Effect::Lights), has(Effect::Table)) {
+            (false, _) => None,
+            (true, false) => Some("light/weighed"),
+            (true, true) => Some("light/table"),
+        };
+        let share = match (has(Effect::Lights), has(Effect::Mis)) {
+            (false, _) => None,
+            (true, false) => Some("light/nee"),
+            (true, true) => Some("light/mis"),
+        };
+        let termination = match (has(Effect::Lecture), has(Effect::Roulette)) {
+            (true, _) => "path/termination/constant",
+            (false, true) => "path/termination/throughput",
+            (false, false) => "path/termination/never",
+        };
+        [
+            ("geometry", geometry),
+            ("media", media),
+            ("sampler", Some(sampler)),
+            ("lights", lights),
+            ("share", share),
+            ("termination", Some(termination)),
+        ]
+        .map(|(name, file)| Role { name, file })
+    }
+}

@@ -1,0 +1,47 @@
+//! Effects of where samples are, and of what pixels keep of them.
+
+use super::{Effect, Row, when};
+use crate::sampler::Sampler;
+
+pub(super) fn rows() -> Vec<Row> {
+    let aov = |wanted: bool| when(wanted, || "--aov".into());
+    vec![
+        Row::new(
+            Effect::Sobol,
+            "sobol",
+            "samples in scrambled Sobol' sequences",
+            |asked| {
+                let sobol = asked.settings.sampler == Sampler::Sobol;
+                when(sobol, || "sampler sobol".into())
+            },
+        )
+        .marks(["sobol4", "sobol_point", "owen_scramble", "batch"]),
+        Row::new(
+            Effect::Classes,
+            "classes",
+            "light by the kind of its path",
+            move |asked| aov(asked.settings.classes),
+        )
+        .marks(["next_class", "light_class", "classes"]),
+        Row::new(
+            Effect::Features,
+            "features",
+            "normal, albedo and depth of what is seen first",
+            move |asked| aov(asked.settings.features),
+        )
+        .marks([
+            "Seen",
+            "seen",
+            "features_seen",
+            "features_normal",
+            "features_albedo",
+        ]),
+        Row::new(
+            Effect::Adaptive,
+            "adaptive",
+            "samples of some tiles of the image only",
+            |asked| when(asked.settings.adaptive, || "--adaptive".into()),
+        )
+        .marks(["adaptive_tiles", "is_chosen"]),
+    ]
+}

@@ -1,0 +1,109 @@
+//! Forms of materials in the kernel.
+
+use glam::DVec3;
+
+/// What of a material is in the kernel together: a set of functions, chosen by the kind code.
+#[derive(Debug, PartialEq, Eq)]
+pub struct Form {
+    /// Its name: of its effect, and of `sample_NAME` and `evaluate_NAME` in the kernel.
+    pub name: &'static str,
+    /// The `type` of its material in scene files, with hyphens, and of its module, with underscores.
+    pub material: &'static str,
+    /// What it adds, in a few words.
+    pub what: &'static str,
+    /// Whether it scatters light in delta lobes alone.
+    pub delta: bool,
+    /// Whether paths cross the surface.
+    pub transmits: bool,
+    /// Members of the kernel's `Material` that it reads, besides those that all have.
+    pub members: &'static [Member],
+}
+
+/// A member of the kernel's `Material`. Materials may share one, of one kind.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Member {
+    /// Its name.
+    pub name: &'static str,
+    /// Its type.
+    pub kind: MemberKind,
+}
+
+/// The type of a member.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MemberKind {
+    /// `vec3f`
+    Vector,
+    /// `f32`
+    Scalar,
+    /// `u32`
+    Word,
+}
+
+impl Member {
+    /// A `vec3f`.
+    #[must_use]
+    pub const fn vector(name: &'static str) -> Self {
+        let kind = MemberKind::Vector;
+        Self { name, kind }
+    }
+
+    /// An `f32`.
+    #[must_use]
+    pub const fn scalar(name: &'static str) -> Self {
+        let kind = MemberKind::Scalar;
+        Self { name, kind }
+    }
+
+    /// The value for materials that do not have it: 0, but 1 for a refractive index.
+    #[must_use]
+    pub fn neutral(self) -> MemberValue {
+        match self.kind {
+            MemberKind::Vector => MemberValue::Vector([0.0; 3]),
+            MemberKind::Scalar if self.name == "ior" => MemberValue::Scalar(1.0),
+            MemberKind::Scalar => MemberValue::Scalar(0.0),
+            MemberKind::Word => MemberValue::Word(0),
+        }
+    }
+
+    /// A `u32`.
+    #[must_use]
+    pub const fn word(name: &'static str) -> Self {
+        let kind = MemberKind::Word;
+        Self { name, kind }
+    }
+}
+
+/// The value of a member, rounded to f32.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum MemberValue {
+    /// Of a `vec3f`.
+    Vector([f32; 3]),
+    /// Of an `f32`.
+    Scalar(f32),
+    /// Of a `u32`.
+    Word(u32),
+}
+
+impl MemberValue {
+    /// Its type.
+    #[must_use]
+    pub fn kind(&self) -> MemberKind {
+        match self {
+            Self::Vector(_) => MemberKind::Vector,
+            Self::Scalar(_) => MemberKind::Scalar,
+            Self::Word(_) => MemberKind::Word,
+        }
+    }
+}
+
+impl From<DVec3> for MemberValue {
+    fn from(v: DVec3) -> Self {
+        Self::Vector(v.as_vec3().to_array())
+    }
+}
+
+impl From<f64> for MemberValue {
+    fn from(x: f64) -> Self {
+        Self::Scalar(x as f32)
+    }
+}

@@ -1,0 +1,175 @@
+//! Materials: how surfaces scatter light, one file each here and in `shaders/materials/`.
+//!
+//! A material is two files and one line, in the list below. Its file here has its parameters as in the
+//! scene file, its forms in the kernel, its f64 twin and its test cases; its file in `shaders/materials/`
+//! the functions of its forms. Schema, validation, hash, kernel members, kind codes, both dispatches, the
+//! rows of the effects and the tests that every material has to pass follow from the line.
+
+mod contract;
+mod form;
+pub mod schema;
+mod uniform;
+
+use std::ops::Deref;
+use std::sync::LazyLock;
+
+use glam::DVec3;
+use schemars::{JsonSchema, Schema, SchemaGenerator};
+use serde::Deserialize;
+
+pub use contract::{BsdfSample, BsdfValue, Event, Surface};
+pub use form::{Form, Member, MemberKind, MemberValue};
+pub use uniform::sample_uniform;
+
+/// What a material says and does. The optics are the twin of `shaders/materials/NAME.wesl`, where the
+/// contract is stated (`contract.wesl`); `wo` is on the side of the surface's normal.
+pub trait Bsdf {
+    /// Which of its forms it has in the kernel.
+    fn form(&self) -> &'static Form;
+
+    /// Its parameters, by their keys in the scene file, in a fixed order.
+    fn parameters(&self) -> Vec<(&'static str, Value)>;
+
+    /// The values of its form's members.
+    fn members(&self) -> Vec<MemberValue>;
+
+    /// Its colour, for the layer `albedo`: about the share of the light that it scatters.
+    fn color(&self) -> DVec3;
+
+    /// The share of the light that it scatters, at most, by channel.
+    fn albedo(&self) -> DVec3;
+
+    /// The k-th moment of the weight of a direction drawn uniformly from the hemisphere, or of a delta
+    /// lobe's, in a channel, at most: what the lecture's variance law needs.
+    fn moment(&self, channel: usize, k: i32) -> f64;
+
+    /// Chooses where a path goes on, from uniform numbers.
+    fn sample(&self, surface: &Surface, wo: DVec3, u: [f64; 4]) -> BsdfSample;
+
+    /// f cos of `wi` and the pdf with which [`sample`](Self::sample) finds it, without delta lobes.
+    fn evaluate(&self, surface: &Surface, wo: DVec3, wi: DVec3) -> BsdfValue;
+
+    /// Absolute refractive index of the inner side; 1 where paths do not cross the surface.
+    fn ior(&self) -> f64 {
+        1.0
+    }
+
+    /// What is legal and probably not meant: what it does, and what to change.
+    fn warning(&self) -> Option<[String; 2]> {
+        None
+    }
+}
+
+/// The value of a parameter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Value {
+    /// A number.
+    Number(f64),
+    /// A colour or a vector.
+    Vector(DVec3),
+}
+
+/// A type of materials.
+pub struct MaterialType {
+    /// The `type` in scene files, and the name of its files.
+    pub name: &'static str,
+    /// Its module's name: that with underscores.
+    pub module: &'static str,
+    /// Its forms in the kernel.
+    pub forms: &'static [Form],
+    /// The text of its file in `shaders/materials/`.
+    pub wesl: &'static str,
+    /// Its parameters' schema.
+    schema: fn(&mut SchemaGenerator) -> Schema,
+    /// Parameters with which it is tested, so many that each form and each limit occurs.
+    pub cases: fn() -> Vec<MaterialKind>,
+}
+
+macro_rules! materials {
+    ($($module:ident :: $Type:ident),* $(,)?) => {
+        $(pub mod $module;)*
+
+        /// How a surface scatters light: a type of materials, with parameters.
+        #[derive(Clone, Debug, PartialEq, Deserialize)]
+        #[serde(tag = "type", rename_all = "kebab-case")]
+        #[expect(missing_docs, reason = "each is described where it is defined")]
+        pub enum MaterialKind {
+            $($Type($module::$Type)),*
+        }
+
+        impl Deref for MaterialKind {
+            type Target = dyn Bsdf;
+
+            fn deref(&self) -> &(dyn Bsdf + 'static) {
+                match self {
+                    $(Self::$Type(material) => material),*
+                }
+            }
+        }
+
+        $(impl From<$module::$Type> for MaterialKind {
+            fn from(material: $module::$Type) -> Self {
+                Self::$Type(material)
+            }
+        })*
+
+        /// All types of materials.
+        pub const ALL: &[MaterialType] = &[
+            $(MaterialType {
+                name: $module::NAME,
+                module: stringify!($module),
+                forms: $module::FORMS,
+                wesl: include_str!(concat!("../../shaders/materials/", stringify!($module), ".wesl")),
+                schema: $module::$Type::json_schema,
+                cases: || $module::cases().into_iter().map(MaterialKind::from).collect(),
+            }),*
+        ];
+    };
+}
+
+materials! {
+    diffuse::Diffuse,
+    mirror::Mirror,
+    dielectric::Dielectric,
+    reflective::Reflective,
+}
+
+impl MaterialKind {
+    /// The name of its type in a scene file.
+    #[must_use]
+    pub fn name(&self) -> &'static str {
+        self.form().material
+    }
+
+    /// Whether paths cross the surface, so that there is a medium on its inner side.
+    #[must_use]
+    pub fn transmits(&self) -> bool {
+        self.form().transmits
+    }
+
+    /// Whether it scatters light in delta lobes alone.
+    #[must_use]
+    pub fn is_delta(&self) -> bool {
+        self.form().delta
+    }
+}
+
+/// All forms of all materials; the place of one is its code in the kernel.
+pub fn forms() -> &'static [&'static Form] {
+    static FORMS: LazyLock<Vec<&'static Form>> =
+        LazyLock::new(|| ALL.iter().flat_map(|material| material.forms).collect());
+    &FORMS
+}
+
+/// The schemas of all materials, without what all have in common.
+pub fn schemas(generator: &mut SchemaGenerator) -> Vec<(&'static str, Schema)> {
+    ALL.iter()
+        .map(|material| (material.name, (material.schema)(generator)))
+        .collect()
+}
+
+/// Relative luminance of linear RGB (ITU-R BT.709).
+#[must_use]
+pub fn luminance(v: DVec3) -> f64 {
+    v.dot(DVec3::new(0.2126, 0.7152, 0.0722))
+}

@@ -1,0 +1,28 @@
+//! Schemas of numbers in scene files, with their limits.
+
+use schemars::{Schema, SchemaGenerator, json_schema};
+
+/// The largest magnitude of any number: its square still fits the f64 in which scenes are kept,
+/// and it fits the f32 of the GPU.
+pub const MAX_MAGNITUDE: f64 = 1e20;
+
+/// Three numbers within these limits.
+#[must_use]
+pub fn vector(minimum: f64, maximum: f64) -> Schema {
+    json_schema!({
+        "type": "array",
+        "items": { "type": "number", "minimum": minimum, "maximum": maximum },
+        "minItems": 3,
+        "maxItems": 3,
+    })
+}
+
+/// A share of the light, by channel.
+pub fn share(_: &mut SchemaGenerator) -> Schema {
+    vector(0.0, 1.0)
+}
+
+/// A radiance.
+pub fn radiance(_: &mut SchemaGenerator) -> Schema {
+    vector(0.0, MAX_MAGNITUDE)
+}

@@ -1,0 +1,16 @@
+//! Twin of `shaders/sampler/purpose.wesl`: which random numbers of a sample are for what.
+
+/// Place in the pixel (x, y) and on the lens (z, w).
+pub const CAMERA: u32 = 0;
+
+/// A scattering event: direction (x, y), lobe (z), roulette (w).
+#[must_use]
+pub fn scattering(bounce: u32) -> u32 {
+    bounce + 1
+}
+
+/// Light sampling at its vertex: direction (x, y), choice of the light (z, w).
+#[must_use]
+pub fn lighting(bounce: u32) -> u32 {
+    65_537 + bounce
+}

@@ -1,0 +1,200 @@
+//! Renders windows on the CPU, path by path.
+
+use std::ops::Range;
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::path::{PathResult, PathTracer};
+use crate::allocation::Tiles;
+use crate::aov::AovSums;
+use crate::error::{Error, Result};
+use crate::film::{BLOCK, NonFinite, PixelSums, Tally, Window};
+use crate::placement::Placement;
+use crate::render::{Control, Renderer};
+use crate::sampler::Sampler;
+use crate::scene::Scene;
+use crate::settings::{Rect, Settings};
+
+/// Renders windows on the CPU.
+#[derive(Debug)]
+pub struct ReferenceRenderer {
+    scene: Scene,
+    placement: Placement,
+    settings: Settings,
+    threads: rayon::ThreadPool,
+}
+
+impl ReferenceRenderer {
+    /// A renderer on `threads` threads; 0: one a core.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if the threads do not start.
+    pub fn new(
+        scene: &Scene,
+        placement: &Placement,
+        settings: &Settings,
+        threads: usize,
+    ) -> Result<Self> {
+        let threads = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .map_err(|e| Error::Device(format!("cannot start {threads} threads: {e}")))?;
+        Ok(Self {
+            scene: scene.clone(),
+            placement: placement.clone(),
+            settings: settings.clone(),
+            threads,
+        })
+    }
+
+    fn pixel(&self, pixel: [u32; 2], samples: &Range<u64>, state: &mut PixelState) {
+        let tracer = PathTracer {
+            scene: &self.scene,
+            placement: &self.placement,
+            settings: &self.settings,
+        };
+        for sample in samples.clone() {
+            let path = tracer.trace(pixel, sample);
+            state.add(pixel, sample, &path, self.settings.sampler);
+        }
+    }
+}
+
+/// One pixel's sums in the middle of a window.
+#[derive(Clone, Debug, Default)]
+struct PixelState {
+    sums: PixelSums,
+    /// Only if something was asked for: they are large.
+    aovs: Option<Box<AovSums>>,
+    batch: DVec3,
+    in_batch: u64,
+    batches: f64,
+    batch_mean: DVec3,
+    tally: Tally,
+}
+
+impl PixelState {
+    fn add(&mut self, pixel: [u32; 2], sample: u64, path: &PathResult, sampler: Sampler) {
+        self.tally.rays += u64::from(path.rays);
+        if path.cut.max_element() > 0.0 {
+            self.tally.cut_paths += 1;
+            self.tally.cut_throughput += path.cut.element_sum() / 3.0;
+        }
+        if path.radiance.is_finite() {
+            self.batch += path.radiance;
+            if let Some(aovs) = &mut self.aovs {
+                aovs.add(&path.aovs);
+            }
+        } else {
+            self.tally.non_finite += 1;
+            let place = NonFinite {
+                pixel,
+                sample,
+                bounce: path.bounces,
+            };
+            self.tally.first_non_finite = self.tally.first_non_finite.or(Some(place));
+        }
+        self.in_batch += 1;
+        let length = sampler.batch(sample);
+        if (sample + 1).is_multiple_of(length) {
+            self.end_batch(self.in_batch == length);
+        }
+    }
+
+    fn end_batch(&mut self, full: bool) {
+        if full {
+            // Welford 1962.
+            self.batches += 1.0;
+            let delta = self.batch - self.batch_mean;
+            self.batch_mean += delta / self.batches;
+            let m2 = delta * (self.batch - self.batch_mean);
+            self.sums.m2 = (DVec3::from(self.sums.m2) + m2).to_array();
+        }
+        self.sums.sum = (DVec3::from(self.sums.sum) + self.batch).to_array();
+        self.batch = DVec3::ZERO;
+        self.in_batch = 0;
+    }
+}
+
+impl Renderer for ReferenceRenderer {
+    fn device(&self) -> (String, String, String) {
+        let threads = self.threads.current_num_threads();
+        (
+            format!(
+                "CPU reference, f64, {threads} thread{}",
+                if threads == 1 { "" } else { "s" }
+            ),
+            "cpu".into(),
+            "none".into(),
+        )
+    }
+
+    fn render_tiles(
+        &mut self,
+        samples: Range<u64>,
+        tiles: Option<&Tiles>,
+        control: &mut dyn Control,
+    ) -> Result<Window> {
+        let crop: Rect = self.settings.crop;
+        let width = crop.width as usize;
+        let blank = PixelState {
+            aovs: self.settings.has_aovs().then(Box::default),
+            ..PixelState::default()
+        };
+        let mut state = vec![blank; crop.pixels()];
+        let chosen = |x: usize, y: usize| tiles.is_none_or(|t| t.has_pixel(x as u32, y as u32));
+        let all = (0..crop.pixels()).filter(|i| chosen(i % width, i / width));
+        let all = all.count() as u64;
+        let mut start = samples.start;
+        while start < samples.end {
+            // A block at a time over the whole image: then it can stop.
+            let end = (start / BLOCK * BLOCK)
+                .saturating_add(BLOCK)
+                .min(samples.end);
+            self.threads.install(|| {
+                state
+                    .par_chunks_mut(width)
+                    .enumerate()
+                    .for_each(|(y, row)| {
+                        for (x, state) in row.iter_mut().enumerate() {
+                            if !chosen(x, y) {
+                                continue;
+                            }
+                            let pixel = [crop.x + x as u32, crop.y + y as u32];
+                            self.pixel(pixel, &(start..end), state);
+                        }
+                    });
+            });
+            let paths = all * (end - start);
+            start = end;
+            if !control.proceed(paths) {
+                break;
+            }
+        }
+        let mut tally = Tally::default();
+        for pixel in &mut state {
+            pixel.end_batch(false);
+            tally.add(&pixel.tally);
+        }
+        Ok(Window {
+            rect: crop,
+            samples: samples.start..start,
+            batch: self.settings.sampler.batch(samples.start),
+            aovs: state
+                .iter()
+                .filter_map(|s| s.aovs.as_deref().copied())
+                .collect(),
+            pixels: state.into_iter().map(|s| s.sums).collect(),
+            tally,
+        })
+    }
+
+    fn show(&mut self, crop: Rect) {
+        self.settings.crop = crop;
+    }
+
+    fn device_bytes(&self) -> u64 {
+        0
+    }
+}

@@ -1,0 +1,129 @@
+//! The module `bsdf`: the struct `Material` and the dispatch to the materials in use.
+
+use std::fmt::Write as _;
+
+use crate::effects::{Effect, Effects};
+use crate::materials::{Form, Member, MemberKind};
+
+/// The members of `Material` in a kernel with `effects`, in its order: what all materials have, and what
+/// the forms in use need. A vector is followed by a scalar as long as there are both, so that they share
+/// 16 bytes.
+///
+/// Every member is where its type alone puts it: naga writes GLSL without offsets, and drops `@align`
+/// (gfx-rs/wgpu issue 4374).
+pub(crate) fn members(effects: &Effects) -> Vec<Member> {
+    let mut own: Vec<Member> = Vec::new();
+    if effects.has(Effect::Emission) {
+        own.push(Member::vector("emission"));
+    }
+    for (_, form) in effects.forms() {
+        for member in form.members {
+            if !own.contains(member) {
+                own.push(*member);
+            }
+        }
+    }
+    let (vectors, scalars): (Vec<Member>, Vec<Member>) =
+        own.into_iter().partition(|m| m.kind == MemberKind::Vector);
+    let mut members = vec![Member::vector("color"), Member::word("kind")];
+    let mut scalars = scalars.into_iter();
+    for vector in vectors {
+        members.push(vector);
+        members.extend(scalars.next());
+    }
+    members.extend(scalars);
+    members
+}
+
+/// The module's text.
+pub(super) fn module(effects: &Effects) -> String {
+    let forms: Vec<(u32, &Form)> = effects.forms().collect();
+    let mut text =
+        String::from("import package::materials::contract::{Surface, BsdfSample, BsdfValue};\n");
+    let uniform = effects.has(Effect::Lecture) && forms.iter().any(|(_, form)| !form.delta);
+    if uniform {
+        text += "import package::materials::uniform::sample_uniform;\n";
+    }
+    for (_, form) in &forms {
+        let (name, module) = (form.name, form.material.replace('-', "_"));
+        // Writing to a String cannot fail.
+        if form.delta || !uniform {
+            let _ = writeln!(text, "import package::materials::{module}::sample_{name};");
+        }
+        if !form.delta {
+            let _ = writeln!(
+                text,
+                "import package::materials::{module}::evaluate_{name};"
+            );
+        }
+    }
+    text += "struct Material {\n";
+    for member in members(effects) {
+        let ty = match member.kind {
+            MemberKind::Vector => "vec3f",
+            MemberKind::Scalar => "f32",
+            MemberKind::Word => "u32",
+        };
+        let _ = writeln!(text, "{}: {ty},", member.name);
+    }
+    text += "}\n";
+    let sampled: Vec<(u32, String)> = forms
+        .iter()
+        .map(|(code, form)| match form.delta || !uniform {
+            true => (
+                *code,
+                format!("return sample_{}(surface, wo, u);", form.name),
+            ),
+            false => (*code, "return sample_uniform(surface, wo, u);".into()),
+        })
+        .collect();
+    let evaluated: Vec<(u32, String)> = forms
+        .iter()
+        .filter(|(_, form)| !form.delta)
+        .map(|(code, form)| {
+            (
+                *code,
+                format!("return evaluate_{}(surface, wo, wi);", form.name),
+            )
+        })
+        .collect();
+    let delta: Vec<(u32, String)> = forms
+        .iter()
+        .map(|(code, form)| (*code, format!("return {};", form.delta)))
+        .collect();
+    text += "fn sample(surface: Surface, wo: vec3f, u: vec4f) -> BsdfSample {\n";
+    text += &dispatch(
+        "surface.material",
+        sampled,
+        "return BsdfSample(surface.normal, vec3f(0.0), 0.0, 0u, 1.0);",
+    );
+    text += "}\nfn evaluate(surface: Surface, wo: vec3f, wi: vec3f) -> BsdfValue {\n";
+    text += &dispatch(
+        "surface.material",
+        evaluated,
+        "return BsdfValue(vec3f(0.0), 0.0, 0u);",
+    );
+    text += "}\nfn is_delta(material: Material) -> bool {\n";
+    text += &dispatch("material", delta, "return true;");
+    text += "}\n";
+    text
+}
+
+/// A switch over the kind of `material`. There is no other kind in the kernel than those of `cases`, so
+/// that the last may be the default; without any, it is what `none` says.
+fn dispatch(material: &str, mut cases: Vec<(u32, String)>, none: &str) -> String {
+    // Alike ones together.
+    let Some((_, last)) = cases.pop() else {
+        return format!("{none}\n");
+    };
+    cases.retain(|(_, case)| *case != last);
+    if cases.is_empty() {
+        return format!("{last}\n");
+    }
+    let mut text = format!("switch {material}.kind {{\n");
+    for (code, case) in cases {
+        let _ = writeln!(text, "case {code}u: {{ {case} }}");
+    }
+    let _ = writeln!(text, "default: {{ {last} }}\n}}");
+    text
+}
