@@ -313,6 +313,12 @@ impl Effects {
         self.forms().any(|(_, form)| form.transmits)
     }
 
+    /// Whether a surface that no path crosses can be in a medium whose index it looks at.
+    #[must_use]
+    pub fn looks_at_index(&self) -> bool {
+        self.transmits() && self.forms().any(|(_, form)| form.relative)
+    }
+
     /// Whether lights are weighed at each vertex.
     #[must_use]
     pub fn weighs_lights(&self) -> bool {
@@ -328,6 +334,7 @@ impl Effects {
             .map(move |row| (row.name, used.contains(&row.effect)));
         effects.chain([
             ("transmits", self.transmits()),
+            ("relative", self.looks_at_index()),
             ("weighed", self.weighs_lights()),
         ])
     }

@@ -10,12 +10,11 @@ use super::{Bsdf, BsdfSample, BsdfValue, Event, Form, Member, MemberValue, Surfa
 pub(super) const NAME: &str = "dielectric";
 
 pub(super) const FORMS: &[Form] = &[Form {
-    name: "dielectric",
-    material: NAME,
     what: "smooth glass: Fresnel reflection and refraction",
     delta: true,
     transmits: true,
     members: &[Member::scalar("ior")],
+    ..Form::of(NAME)
 }];
 
 /// Smooth glass.

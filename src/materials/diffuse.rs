@@ -13,12 +13,8 @@ use crate::reference::core::sampling::cosine_direction;
 pub(super) const NAME: &str = "diffuse";
 
 pub(super) const FORMS: &[Form] = &[Form {
-    name: "diffuse",
-    material: NAME,
     what: "Lambert's law",
-    delta: false,
-    transmits: false,
-    members: &[],
+    ..Form::of(NAME)
 }];
 
 /// Lambert's law: BRDF = albedo/π.

@@ -15,8 +15,26 @@ pub struct Form {
     pub delta: bool,
     /// Whether paths cross the surface.
     pub transmits: bool,
+    /// Of one that does not: whether it looks at the index before the surface.
+    pub relative: bool,
     /// Members of the kernel's `Material` that it reads, besides those that all have.
     pub members: &'static [Member],
+}
+
+impl Form {
+    /// The form with the name of its material that has nothing special.
+    #[must_use]
+    pub const fn of(material: &'static str) -> Self {
+        Self {
+            name: material,
+            material,
+            what: "",
+            delta: false,
+            transmits: false,
+            relative: false,
+            members: &[],
+        }
+    }
 }
 
 /// A member of the kernel's `Material`. Materials may share one, of one kind.

@@ -9,12 +9,9 @@ use super::{Bsdf, BsdfSample, BsdfValue, Event, Form, MemberValue, Surface, Valu
 pub(super) const NAME: &str = "mirror";
 
 pub(super) const FORMS: &[Form] = &[Form {
-    name: "mirror",
-    material: NAME,
     what: "perfect mirrors",
     delta: true,
-    transmits: false,
-    members: &[],
+    ..Form::of(NAME)
 }];
 
 /// A perfect mirror.

@@ -7,6 +7,7 @@
 
 mod contract;
 mod form;
+pub mod ggx;
 pub mod schema;
 mod uniform;
 
@@ -54,10 +55,26 @@ pub trait Bsdf {
         1.0
     }
 
+    /// What is wrong with its parameters together.
+    fn mistake(&self) -> Option<Mistake> {
+        None
+    }
+
     /// What is legal and probably not meant: what it does, and what to change.
     fn warning(&self) -> Option<[String; 2]> {
         None
     }
+}
+
+/// Parameters of which each is right, but not all together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Mistake {
+    /// The key to show; `type` if something is missing.
+    pub key: &'static str,
+    /// What is wrong.
+    pub what: &'static str,
+    /// What to do about it.
+    pub help: &'static str,
 }
 
 /// The value of a parameter.

@@ -16,11 +16,7 @@ use crate::reference::core::sampling::{cap_direction, cosine_direction};
 pub(super) const NAME: &str = "reflective";
 
 pub(super) const FORMS: &[Form] = &[Form {
-    name: "reflective",
-    material: NAME,
     what: "the lecture's lobe around the ideal reflection",
-    delta: false,
-    transmits: false,
     members: &[
         Member::vector("specular"),
         // 1 - cos(half angle) of the lobe.
@@ -31,6 +27,7 @@ pub(super) const FORMS: &[Form] = &[Form {
         Member::scalar("lobe_weight"),
         Member::scalar("color_weight"),
     ],
+    ..Form::of(NAME)
 }];
 
 /// A material may reflect this much more than everything without a warning: the lecture's ε = 0.01,

@@ -1,5 +1,6 @@
 //! Schemas of numbers in scene files, with their limits.
 
+use glam::DVec3;
 use schemars::{Schema, SchemaGenerator, json_schema};
 
 /// The largest magnitude of any number: its square still fits the f64 in which scenes are kept,
@@ -26,3 +27,19 @@ pub fn share(_: &mut SchemaGenerator) -> Schema {
 pub fn radiance(_: &mut SchemaGenerator) -> Schema {
     vector(0.0, MAX_MAGNITUDE)
 }
+
+/// An axis, and its default.
+pub fn axis(_: &mut SchemaGenerator) -> Schema {
+    let mut schema = vector(-MAX_MAGNITUDE, MAX_MAGNITUDE);
+    schema.insert("default".into(), serde_json::json!([0.0, 1.0, 0.0]));
+    schema
+}
+
+/// The default of an axis.
+#[must_use]
+pub fn up() -> DVec3 {
+    DVec3::Y
+}
+
+/// What to do about an axis without a direction.
+pub const AXIS_HELP: &str = "`axis = [0.0, 1.0, 0.0]` is the default";

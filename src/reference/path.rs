@@ -9,7 +9,7 @@ use super::light::environment_radiance;
 use super::light::sphere::{light_pdf, mis_weight, sample_light};
 use super::purpose::{CAMERA, lighting, scattering};
 use super::scene::camera::camera_ray;
-use super::scene::priority::{cross_surface, relative_index};
+use super::scene::priority::{cross_surface, index_within, relative_index};
 use super::scene::ray::{Hit, Ray, Vertex, leave, vertex_at};
 use super::scene::sphere::closest_hit;
 use crate::aov::{AovSums, LightClass};
@@ -141,14 +141,14 @@ impl PathTracer<'_> {
             return false;
         }
         let u = random(scattering(path.found.bounces));
+        let (media, ior) = (&path.ray.media, material.kind.ior());
         let surface = Surface {
             normal: vertex.normal,
-            eta: relative_index(
-                &path.ray.media,
-                sphere.level,
-                material.kind.ior(),
-                hit.inside,
-            ),
+            eta: if material.kind.transmits() {
+                relative_index(media, sphere.level, ior, hit.inside)
+            } else {
+                1.0 / index_within(media)
+            },
         };
         let wo = -path.ray.direction;
         if self.samples_lights() {

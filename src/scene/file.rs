@@ -12,7 +12,7 @@ use glam::DVec3;
 use schemars::transform::RecursiveTransform;
 use schemars::{JsonSchema, Schema, SchemaGenerator, generate::SchemaSettings, json_schema};
 use serde::Deserialize;
-use serde_json::json;
+use serde_json::{Value, json};
 use toml::Spanned;
 
 use crate::materials::schema::{MAX_MAGNITUDE, radiance, vector};
@@ -154,13 +154,13 @@ impl JsonSchema for MaterialTable {
         );
         let with_common = |(name, mut schema): (&str, Schema)| {
             let object = schema.ensure_object();
-            let properties = object["properties"].as_object_mut();
-            if let Some(properties) = properties {
+            let properties = object.get_mut("properties");
+            if let Some(properties) = properties.and_then(Value::as_object_mut) {
                 properties.insert("type".into(), json!({ "type": "string", "const": name }));
                 properties.insert("emission".into(), emission.as_value().clone());
             }
-            let required = object["required"].as_array_mut();
-            if let Some(required) = required {
+            let required = object.entry("required").or_insert(json!([]));
+            if let Some(required) = required.as_array_mut() {
                 required.insert(0, "type".into());
             }
             object.insert("additionalProperties".into(), json!(false));

@@ -133,9 +133,10 @@ fn parse(text: &str, report: &mut Report) -> Option<Scene> {
     if !report.errors.is_empty() {
         return None;
     }
+    let keys = validate::material_keys(root.get_ref());
     let file = SceneFile::deserialize(Deserializer::from(root))
         .map_err(|error| report.errors.push(syntax(&error)));
-    validate::scene(file.ok()?, report)
+    validate::scene(file.ok()?, &keys, report)
 }
 
 /// An error of the TOML parser, in words for those who know other formats.

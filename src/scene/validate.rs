@@ -5,11 +5,13 @@ use std::ops::Range;
 
 use glam::DVec3;
 use toml::Spanned;
+use toml::de::DeTable;
 
 use super::file::{CameraTable, HandednessName, MaterialTable, SceneFile, SphereTable};
 use super::report::{Problem, Report};
 use super::suggest::{list, nearest};
 use super::{Camera, Handedness, Material, RenderDefaults, Scene, Sphere};
+use crate::materials::Mistake;
 
 /// Directions whose angle has a smaller sine are parallel: of the sixteen digits of an f64 the
 /// cross product keeps half, which is what the f32 of the GPU needs.
@@ -22,15 +24,38 @@ pub(super) const SHORTEST: f64 = 1e-140;
 /// At most so many material names are listed in a message.
 const NAMES_LISTED: usize = 12;
 
+/// Where each key of each material is.
+pub(super) type MaterialKeys = HashMap<(String, String), Range<usize>>;
+
+/// Where each key of each material of a file is.
+pub(super) fn material_keys(root: &DeTable<'_>) -> MaterialKeys {
+    let materials = root.get("material").and_then(|m| m.get_ref().as_table());
+    let mut keys = HashMap::new();
+    for (name, material) in materials.into_iter().flatten() {
+        for (key, _) in material.get_ref().as_table().into_iter().flatten() {
+            let place = (name.get_ref().to_string(), key.get_ref().to_string());
+            keys.insert(place, key.span());
+        }
+    }
+    keys
+}
+
 /// The scene of a file; `None` after errors, which the report then holds.
-pub(super) fn scene(file: SceneFile, report: &mut Report) -> Option<Scene> {
+pub(super) fn scene(file: SceneFile, keys: &MaterialKeys, report: &mut Report) -> Option<Scene> {
     let camera = camera(&file.camera, report);
     let mut materials: Vec<_> = file
         .material
         .into_iter()
         .map(|(name, table)| {
             let span = name.span();
-            (span, material(name.into_inner(), table))
+            let material = material(name.into_inner(), table);
+            if let Some(Mistake { key, what, help }) = material.kind.mistake() {
+                let at = keys.get(&(material.name.clone(), key.to_owned()));
+                let at = at.unwrap_or(&span).clone();
+                let message = format!("{what} in `[material.{}]`", material.name.escape_debug());
+                report.errors.push(Problem::new(at, message, "").help(help));
+            }
+            (span, material)
         })
         .collect();
     // The map is ordered by name; the order of the file is what people expect to see.

@@ -91,6 +91,10 @@ pub(super) fn module(effects: &Effects) -> String {
         .iter()
         .map(|(code, form)| (*code, format!("return {};", form.delta)))
         .collect();
+    let transmitting: Vec<(u32, String)> = forms
+        .iter()
+        .map(|(code, form)| (*code, format!("return {};", form.transmits)))
+        .collect();
     text += "fn sample(surface: Surface, wo: vec3f, u: vec4f) -> BsdfSample {\n";
     text += &dispatch(
         "surface.material",
@@ -105,6 +109,8 @@ pub(super) fn module(effects: &Effects) -> String {
     );
     text += "}\nfn is_delta(material: Material) -> bool {\n";
     text += &dispatch("material", delta, "return true;");
+    text += "}\nfn transmits(material: Material) -> bool {\n";
+    text += &dispatch("material", transmitting, "return false;");
     text += "}\n";
     text
 }

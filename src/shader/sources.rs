@@ -27,6 +27,7 @@ sources![
     "light/table",
     "light/weighed",
     "materials/contract",
+    "materials/ggx",
     "materials/uniform",
     "path/class",
     "path/state",

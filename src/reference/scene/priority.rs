@@ -18,6 +18,13 @@ pub fn relative_index(media: &Media, level: u32, ior: f64, inside: bool) -> f64 
     if inside { outer / ior } else { ior / outer }
 }
 
+/// Index of what the path is in.
+#[must_use]
+pub fn index_within(media: &Media) -> f64 {
+    let top = media.iter().max_by_key(|m| m.level);
+    top.map_or(1.0, |top| top.ior)
+}
+
 /// Whether the path is in the dielectric `sphere`.
 #[must_use]
 pub fn is_within(media: &Media, sphere: usize) -> bool {
