@@ -149,6 +149,7 @@ materials! {
     mirror::Mirror,
     dielectric::Dielectric,
     reflective::Reflective,
+    conductor::Conductor,
 }
 
 impl MaterialKind {
