@@ -1,4 +1,5 @@
-//! Twin of `shaders/sampler/purpose.wesl`: which random numbers of a sample are for what.
+//! Twin of `shaders/sampler/purpose.wesl`, which has the table: which random numbers of a sample are for
+//! what. Four dimensions are drawn at a time, by the number of the four.
 
 /// Place in the pixel (x, y) and on the lens (z, w).
 pub const CAMERA: u32 = 0;
@@ -6,11 +7,11 @@ pub const CAMERA: u32 = 0;
 /// A scattering event: direction (x, y), lobe (z), roulette (w).
 #[must_use]
 pub fn scattering(bounce: u32) -> u32 {
-    bounce + 1
+    4 * (bounce + 1)
 }
 
 /// Light sampling at its vertex: direction (x, y), choice of the light (z, w).
 #[must_use]
 pub fn lighting(bounce: u32) -> u32 {
-    65_537 + bounce
+    4 * (bounce + 1) + 1
 }
