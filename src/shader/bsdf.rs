@@ -87,14 +87,6 @@ pub(super) fn module(effects: &Effects) -> String {
             )
         })
         .collect();
-    let delta: Vec<(u32, String)> = forms
-        .iter()
-        .map(|(code, form)| (*code, format!("return {};", form.delta)))
-        .collect();
-    let transmitting: Vec<(u32, String)> = forms
-        .iter()
-        .map(|(code, form)| (*code, format!("return {};", form.transmits)))
-        .collect();
     text += "fn sample(surface: Surface, wo: vec3f, u: vec4f) -> BsdfSample {\n";
     text += &dispatch(
         "surface.material",
@@ -107,12 +99,24 @@ pub(super) fn module(effects: &Effects) -> String {
         evaluated,
         "return BsdfValue(vec3f(0.0), 0.0, 0u);",
     );
-    text += "}\nfn is_delta(material: Material) -> bool {\n";
-    text += &dispatch("material", delta, "return true;");
-    text += "}\nfn transmits(material: Material) -> bool {\n";
-    text += &dispatch("material", transmitting, "return false;");
     text += "}\n";
+    text += &predicate("is_delta", &forms, |form| form.delta);
+    text += &predicate("transmits", &forms, |form| form.transmits);
     text
+}
+
+/// A function that says whether a material's form is such a one.
+fn predicate(name: &str, forms: &[(u32, &Form)], holds: impl Fn(&Form) -> bool) -> String {
+    let such = forms.iter().filter(|(_, form)| holds(form));
+    let such: Vec<String> = such
+        .map(|(code, _)| format!("material.kind == {code}u"))
+        .collect();
+    let condition = match such.len() {
+        0 => "false".to_owned(),
+        all if all == forms.len() => "true".to_owned(),
+        _ => such.join(" || "),
+    };
+    format!("fn {name}(material: Material) -> bool {{\nreturn {condition};\n}}\n")
 }
 
 /// A switch over the kind of `material`. There is no other kind in the kernel than those of `cases`, so
