@@ -4,7 +4,7 @@
 //! are dropped from the shared structs, its branches and bindings are gone. The kernel's sources
 //! (`shaders/`) name effects in `@if(...)`; [`Effects::flags`] says which are on.
 
-use crate::lights::MOST_WEIGHED;
+use crate::placement::lights::MOST_WEIGHED;
 use crate::placement::{PlacedSphere, Placement, Side};
 use crate::sampler::Sampler;
 use crate::scene::{MaterialKind, Scene};

@@ -9,8 +9,7 @@ use glam::DVec3;
 
 use crate::allocation::{TILE, Tiles};
 use crate::effects::Effects;
-use crate::lights::Light;
-use crate::placement::{PlacedCamera, PlacedSphere, Placement};
+use crate::placement::{Light, PlacedCamera, PlacedSphere, Placement};
 use crate::scene::{Material, MaterialKind, luminance};
 use crate::settings::Rect;
 

@@ -2,11 +2,11 @@
 
 use wgpu::util::DeviceExt as _;
 
-use crate::containment::MOST_CORES;
 use crate::effects::Effects;
 use crate::error::{Error, Result};
 use crate::gpu::layout::{LightRecord, MaterialRecord, PoleRecord, SphereRecord, light_weight};
 use crate::placement::Placement;
+use crate::placement::containment::MOST_CORES;
 use crate::scene::Scene;
 use crate::shader::Kernel;
 

@@ -9,8 +9,7 @@ use wesl::{ManglerKind, ModulePath, VirtualResolver, Wesl};
 
 use crate::effects::Effects;
 use crate::error::{Error, Result};
-use crate::media::Medium;
-use crate::placement::Placement;
+use crate::placement::{Medium, Placement};
 use crate::scene::Scene;
 
 /// A linked and validated kernel.

@@ -6,7 +6,7 @@ use std::cmp::Ordering;
 
 use glam::DVec3;
 
-use crate::containment::ROUNDING;
+use super::containment::ROUNDING;
 use crate::scene::Scene;
 
 /// The most levels: the kernel keeps the set of media a path is in as the bits of a word.

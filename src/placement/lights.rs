@@ -2,7 +2,7 @@
 //!
 //! Part of the placement: decided once, for both renderers.
 
-use crate::placement::{PlacedSphere, Placement, Side};
+use super::{PlacedSphere, Placement, Side};
 use crate::scene::{Scene, Sphere, luminance};
 use crate::settings::{LightSampling, Offset};
 

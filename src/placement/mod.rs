@@ -6,13 +6,18 @@
 //! is moved or scaled by a power of two gives the same numbers, and a wall of radius 1e8 keeps all
 //! its digits where the picture is.
 
+pub mod containment;
+pub mod lights;
+pub mod media;
+
+pub use lights::{Light, Lights};
+pub use media::{Media, Medium};
+
 use glam::DVec3;
 
-use crate::containment::{ROUNDING, containers, reachable};
-use crate::lights::Lights;
-use crate::media::{Media, Medium};
 use crate::scene::{Handedness, Scene};
 use crate::settings::Offset;
+use containment::{ROUNDING, containers, reachable};
 
 /// A scene's spheres and camera as the renderers use them.
 #[derive(Clone, Debug)]

@@ -4,8 +4,8 @@
 
 use std::collections::HashMap;
 
-use crate::media::precedes;
-use crate::placement::Side;
+use super::Side;
+use super::media::precedes;
 use crate::scene::Scene;
 
 /// Opaque spheres of either side that are looked at as containers: walls and shells are few and large,
