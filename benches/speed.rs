@@ -4,6 +4,7 @@
 //! Every figure is a ratio of two things that ran in turns, since machines are noisy: the medians
 //! of several rounds. Nothing is asserted.
 
+mod loading;
 mod naive;
 mod offsets;
 
@@ -45,6 +46,9 @@ fn main() {
     }
     if chosen("offsets") {
         offsets::run();
+    }
+    if chosen("loading") {
+        loading::run(&gpu);
     }
 }
 

@@ -6,9 +6,8 @@
 //! 1. [`cli`]: what was typed.
 //! 2. [`settings`]: what will be rendered, validated. [`sampler`]: which samples are placed together.
 //! 3. [`scene`]: the scene file, validated.
-//! 4. [`placement`]: where everything is, in f64, relative to where the picture is.
-//!    [`lights`]: what light sampling chooses from.
-//!    [`media`]: which of several dielectrics fills the space. [`containment`]: what lies in what.
+//! 4. [`placement`]: where everything is, in f64, relative to where the picture is; what lies in what, which of
+//!    several dielectrics fills the space, what light sampling chooses from.
 //! 5. [`effects`]: what the scene asks for; nothing else goes into the kernel.
 //! 6. [`shader`]: the kernel, linked for these effects from `shaders/`.
 //! 7. [`gpu`] and [`reference`](mod@reference): two renderers, wgpu in f32 and the CPU in f64, that
@@ -31,7 +30,6 @@ pub mod backend;
 pub mod check;
 pub mod cli;
 pub mod compare;
-pub mod containment;
 pub mod effects;
 pub mod error;
 pub mod estimate;
@@ -41,9 +39,7 @@ pub mod gpu;
 pub mod input;
 pub mod intervals;
 pub mod ledger;
-pub mod lights;
 pub mod materials;
-pub mod media;
 pub mod output;
 pub mod placement;
 pub mod reference;

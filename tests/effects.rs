@@ -8,8 +8,8 @@ use std::fmt::Write as _;
 
 use common::{scene, scene_file, scene_files};
 use gpu_trace::effects::Effects;
-use gpu_trace::lights::MOST_WEIGHED;
 use gpu_trace::placement::Placement;
+use gpu_trace::placement::lights::MOST_WEIGHED;
 use gpu_trace::sampler::Sampler;
 use gpu_trace::scene::Scene;
 use gpu_trace::settings::{GeometryChoice, Integrator, LightSampling, Offset, Settings};

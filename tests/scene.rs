@@ -500,3 +500,24 @@ fn the_gallery_and_the_test_scenes_load() {
     }
     assert!(count >= 15, "only {count} scenes");
 }
+
+#[test]
+fn of_many_unknown_materials_each_that_is_shown_has_its_suggestion() {
+    let sphere = "[[sphere]]\ncenter = [0, 0, 0]\nradius = 1\nmaterial = \"whit\"\n";
+    for (count, shown, more) in [
+        (20, 20, None),
+        (25, 20, Some("error: and 5 more like these")),
+    ] {
+        let text = format!("{GOOD}{}", sphere.repeat(count));
+        let Err(Error::Scene(message)) = load_str("scene", &text) else {
+            panic!("{count} unknown materials are accepted");
+        };
+        assert_eq!(message.matches("unknown material \"whit\"").count(), shown);
+        assert_eq!(message.matches("did you mean \"white\"?").count(), shown);
+        let last = message
+            .lines()
+            .last()
+            .filter(|line| line.starts_with("error: and"));
+        assert_eq!(last, more);
+    }
+}

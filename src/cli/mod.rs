@@ -24,7 +24,7 @@ use clap::{CommandFactory as _, Parser, Subcommand};
 
 use crate::effects::Effects;
 use crate::error::{Error, Result};
-use crate::media::MAX_LEVELS;
+use crate::placement::media::MAX_LEVELS;
 use crate::placement::{Placement, Side};
 use crate::scene::Scene;
 use crate::settings::{Offset, Settings};

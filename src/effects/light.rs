@@ -1,7 +1,7 @@
 //! Effects of where light comes from and how it is looked for.
 
 use super::{Asked, Effect, Row, when};
-use crate::lights::MOST_WEIGHED;
+use crate::placement::lights::MOST_WEIGHED;
 use crate::settings::{Integrator, LightSampling};
 
 pub(super) fn rows() -> Vec<Row> {

@@ -9,9 +9,8 @@ use glam::DVec3;
 
 use crate::allocation::{TILE, Tiles};
 use crate::effects::{Effect, Effects};
-use crate::lights::Light;
 use crate::materials::{Member, MemberValue, forms};
-use crate::placement::{PlacedCamera, PlacedSphere, Placement};
+use crate::placement::{Light, PlacedCamera, PlacedSphere, Placement};
 use crate::scene::Material;
 use crate::settings::Rect;
 

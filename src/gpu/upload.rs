@@ -2,12 +2,12 @@
 
 use wgpu::util::DeviceExt as _;
 
-use crate::containment::MOST_CORES;
 use crate::effects::{Effect, Effects};
 use crate::error::{Error, Result};
 use crate::gpu::layout::{LightRecord, MaterialRecord, PoleRecord, SphereRecord, light_weight};
 use crate::materials::Member;
 use crate::placement::Placement;
+use crate::placement::containment::MOST_CORES;
 use crate::scene::Scene;
 use crate::shader::{Kernel, material_members};
 

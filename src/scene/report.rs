@@ -11,7 +11,7 @@ use codespan_reporting::files;
 use codespan_reporting::term;
 
 /// At most so many problems are shown: one mistake in a generated file can repeat a million times.
-const SHOWN: usize = 20;
+pub(super) const SHOWN: usize = 20;
 
 /// Of a longer line, only this many bytes around the place are shown.
 const LINE_WINDOW: usize = 160;

@@ -8,7 +8,7 @@ use toml::Spanned;
 use toml::de::DeTable;
 
 use super::file::{CameraTable, HandednessName, MaterialTable, SceneFile, SphereTable};
-use super::report::{Problem, Report};
+use super::report::{Problem, Report, SHOWN};
 use super::suggest::{list, nearest};
 use super::{Camera, Handedness, Material, RenderDefaults, Scene, Sphere};
 use crate::materials::Mistake;
@@ -69,9 +69,15 @@ pub(super) fn scene(file: SceneFile, keys: &MaterialKeys, report: &mut Report) -
         .collect();
     let mut spheres = Vec::with_capacity(file.sphere.len());
     let mut used = BTreeSet::new();
+    let mut looked_up = 0..SHOWN;
     for sphere in &file.sphere {
         let Some(&index) = names.get(sphere.material.get_ref().as_str()) else {
-            let problem = unknown_material(sphere.material.get_ref(), &materials);
+            // All materials are looked through for what was meant, so only where that is shown: the
+            // spheres come in the order of the file, and the rest is counted.
+            let problem = match looked_up.next() {
+                Some(_) => unknown_material(sphere.material.get_ref(), &materials),
+                None => Problem::new(0..0, "unknown material", ""),
+            };
             report.errors.push(Problem {
                 span: sphere.material.span(),
                 ..problem

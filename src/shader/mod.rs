@@ -13,8 +13,7 @@ use wesl::{ManglerKind, ModulePath, VirtualResolver, Wesl};
 use crate::effects::{Effect, Effects, Role};
 use crate::error::{Error, Result};
 use crate::materials;
-use crate::media::Medium;
-use crate::placement::Placement;
+use crate::placement::{Medium, Placement};
 use crate::scene::Scene;
 
 /// A linked and validated kernel.

@@ -12,6 +12,7 @@ Usage: cargo xtask bench [TABLE...] [--quick]
   unused     effects that a scene does not use
   offsets    ways to leave a surface: what each gets wrong, and costs
   geometry   spheres as constants or in a buffer
+  loading    from a scene file to the first dispatch: each stage for 1e3, 1e4 and 1e5 spheres
   forecasts  what price says of five scenes, and what the renders then take (some minutes)
   resources  time to the first window, peak memory
   peers      Mitsuba 3 on the same scenes (installs it into target/peers with pip; needs LLVM 19,
@@ -26,11 +27,12 @@ Without a name: all but forecasts, peers, hazards and coverage. Run it on an idl
 
 /// Runs the benchmarks named in `tables`.
 pub(crate) fn all(tables: &[String]) -> Result<(), String> {
-    const KNOWN: [&str; 9] = [
+    const KNOWN: [&str; 10] = [
         "naive",
         "unused",
         "geometry",
         "offsets",
+        "loading",
         "resources",
         "forecasts",
         "peers",
@@ -51,7 +53,7 @@ pub(crate) fn all(tables: &[String]) -> Result<(), String> {
     }
     let chosen = |name: &str| tables.is_empty() || tables.iter().any(|t| t == name);
     run(cargo().args(["build", "--release"]))?;
-    let in_process: Vec<&str> = KNOWN[..4]
+    let in_process: Vec<&str> = KNOWN[..5]
         .iter()
         .copied()
         .filter(|name| chosen(name))

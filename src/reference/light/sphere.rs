@@ -6,8 +6,7 @@ use glam::{DVec2, DVec3};
 
 use super::aim::{Aim, aim_at, cone_height};
 use super::projected::{cap_seen, sample_cap};
-use crate::lights::{Light, Lights};
-use crate::placement::Placement;
+use crate::placement::{Light, Lights, Placement};
 use crate::reference::core::sampling::cap_direction;
 use crate::reference::scene::ray::Vertex;
 use crate::settings::LightSampling;

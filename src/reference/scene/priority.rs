@@ -1,6 +1,6 @@
 //! Twin of `shaders/scene/priority.wesl`: nested dielectrics after Schmidt and Budge (2002).
 
-use crate::media::Medium;
+use crate::placement::Medium;
 
 /// The dielectrics that a path is in; `sphere` is the index into the placement's spheres.
 pub type Media = Vec<Medium>;

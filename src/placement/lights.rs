@@ -2,8 +2,11 @@
 //!
 //! Part of the placement: decided once, for both renderers.
 
+use std::collections::HashSet;
+
+use super::sphere::{PlacedSphere, Side};
+use super::tree::{Bounds, Tree};
 use crate::materials::luminance;
-use crate::placement::{PlacedSphere, Placement, Side};
 use crate::scene::{Scene, Sphere};
 use crate::settings::{LightSampling, Offset};
 
@@ -35,43 +38,100 @@ pub struct Lights {
 /// it gains nothing (`benches/RESULTS.md`); where the gain ends was not measured.
 pub const MOST_WEIGHED: usize = 8;
 
-/// Whether light sampling finds this sphere from outside. Walls (with a pole frame) fill so much of the view
+/// The spheres that light sampling finds from outside. Walls (with a pole frame) fill so much of the view
 /// that BSDF sampling finds them as well, and the rest of the scene hides most of them: that both look for them
 /// still costs less for the same error, but a tenth more in the lecture's scene (`benches/RESULTS.md`). Lamps
 /// that only glass can see are left to BSDF sampling.
-fn is_sampled(scene: &Scene, sphere: &PlacedSphere) -> bool {
-    let emission = scene.materials[sphere.material].emission;
-    sphere.side != Side::Inside && luminance(emission) > 0.0 && !is_sealed(scene, sphere.source)
+fn sampled(scene: &Scene, spheres: &[PlacedSphere]) -> Vec<usize> {
+    let emits = |s: &PlacedSphere| luminance(scene.materials[s.material].emission) > 0.0;
+    let is_lamp = |i: &usize| spheres[*i].side != Side::Inside && emits(&spheres[*i]);
+    let lamps: Vec<usize> = (0..spheres.len()).filter(is_lamp).collect();
+    let sources: Vec<usize> = lamps.iter().map(|i| spheres[*i].source).collect();
+    let sealed = sealed(scene, &sources);
+    let lamps = lamps.into_iter().zip(sealed);
+    lamps
+        .filter(|(_, sealed)| !sealed)
+        .map(|(i, _)| i)
+        .collect()
 }
 
-/// Whether a dielectric is all around `scene.spheres[lamp]`, and nothing in it scatters light but in
-/// delta lobes: to every vertex that looks for lights, its surface hides the lamp.
-fn is_sealed(scene: &Scene, lamp: usize) -> bool {
-    let kind = |sphere: &Sphere| &scene.materials[sphere.material].kind;
-    let smooth = |sphere: &Sphere| kind(sphere).is_delta();
-    let inner = &scene.spheres[lamp];
-    scene.spheres.iter().enumerate().any(|(glass, outer)| {
-        let distance = |other: &Sphere| other.center.distance(outer.center);
-        let reaches = |other: &Sphere| {
-            let apart = distance(other) >= outer.radius + other.radius;
-            let around = distance(other) + outer.radius <= other.radius;
-            !apart && !around
+/// For each of the scene's spheres `lamps`, whether a dielectric is all around it, and nothing in that scatters
+/// light but in delta lobes: to every vertex that looks for lights, its surface hides the lamp.
+fn sealed(scene: &Scene, lamps: &[usize]) -> Vec<bool> {
+    let sphere = |i: usize| &scene.spheres[i];
+    let kind = |i: &usize| &scene.materials[sphere(*i).material].kind;
+    let tree = |some: &[usize]| {
+        let balls = some.iter().map(|i| (sphere(*i).center, sphere(*i).radius));
+        Tree::new(&balls.collect::<Vec<_>>())
+    };
+    if lamps.is_empty() {
+        return Vec::new();
+    }
+    let all = 0..scene.spheres.len();
+    let rough: Vec<usize> = all.clone().filter(|i| !kind(i).is_delta()).collect();
+    let rough_tree = tree(&rough);
+    // Dielectrics with nothing in them that scatters, and lamps that are alone in one.
+    let mut clear = Vec::new();
+    let mut alone = HashSet::new();
+    for glass in all.filter(|i| kind(i).transmits()) {
+        // If there are two, one is left beside any lamp.
+        let mut inside = Vec::new();
+        rough_tree.search(
+            &mut inside,
+            |inside: &Vec<usize>, bounds| {
+                (inside.len() < 2 && may_reach_into(sphere(glass), bounds)).then_some(0.0)
+            },
+            |inside, ball| {
+                let i = rough[ball];
+                if inside.len() < 2 && i != glass && reaches_into(sphere(glass), sphere(i)) {
+                    inside.push(i);
+                }
+            },
+        );
+        match inside[..] {
+            [] => clear.push(glass),
+            [lamp] if holds(sphere(glass), sphere(lamp)) => _ = alone.insert(lamp),
+            _ => {}
+        }
+    }
+    let clear_tree = tree(&clear);
+    let is_sealed = |lamp: &usize| {
+        let inner = sphere(*lamp);
+        let may_hold = |bounds: &Bounds| {
+            (bounds.nearest(inner.center) + inner.radius <= bounds.most).then_some(bounds.most)
         };
-        glass != lamp
-            && kind(outer).transmits()
-            && distance(inner) + inner.radius <= outer.radius
-            && !scene
-                .spheres
-                .iter()
-                .enumerate()
-                .any(|(i, other)| i != lamp && i != glass && !smooth(other) && reaches(other))
-    })
+        alone.contains(lamp)
+            || clear_tree.any(may_hold, |ball| {
+                clear[ball] != *lamp && holds(sphere(clear[ball]), inner)
+            })
+    };
+    lamps.iter().map(is_sealed).collect()
+}
+
+/// Whether all of `inner` is in `outer`.
+fn holds(outer: &Sphere, inner: &Sphere) -> bool {
+    inner.center.distance(outer.center) + inner.radius <= outer.radius
+}
+
+/// Whether some of the surface of `other` is in `glass`.
+fn reaches_into(glass: &Sphere, other: &Sphere) -> bool {
+    let distance = other.center.distance(glass.center);
+    let apart = distance >= glass.radius + other.radius;
+    let around = distance + glass.radius <= other.radius;
+    !apart && !around
+}
+
+/// Whether a sphere within the bounds may reach into `glass`.
+fn may_reach_into(glass: &Sphere, bounds: &Bounds) -> bool {
+    let apart = bounds.nearest(glass.center) >= glass.radius + bounds.most;
+    let around = bounds.farthest(glass.center) + glass.radius <= bounds.least;
+    !apart && !around
 }
 
 /// How far the spheres without a pole frame reach. A wall sends no more than a lamp of this radius at this
 /// distance would; what is beyond sends nothing into the picture.
-fn extent(placement: &Placement) -> f64 {
-    let centered = placement.spheres.iter().filter(|s| s.pole.is_none());
+fn extent(spheres: &[PlacedSphere]) -> f64 {
+    let centered = spheres.iter().filter(|s| s.pole.is_none());
     let reach = centered.map(|s| s.anchor.length() + s.radius);
     let farthest = reach.fold(0.0, f64::max);
     // Of walls alone none is larger than another, in whatever unit.
@@ -79,26 +139,25 @@ fn extent(placement: &Placement) -> f64 {
 }
 
 impl Lights {
-    /// The lights of `scene`; none if the lens straddles a lamp: what is sampled and what is not must
-    /// be known when a ray hits it.
+    /// The lights among `spheres`, those of `scene` as they are placed, for paths that leave surfaces by `offset`;
+    /// none if the lens straddles a lamp: what is sampled and what is not must be known when a ray hits it.
     #[must_use]
-    pub fn new(scene: &Scene, placement: &Placement) -> Self {
+    pub fn new(scene: &Scene, spheres: &[PlacedSphere], offset: Offset) -> Self {
         let unknown = |s: &PlacedSphere| {
             s.side == Side::Sign && scene.materials[s.material].emission.max_element() > 0.0
         };
-        if placement.offset == Offset::Exact && placement.spheres.iter().any(unknown) {
+        if offset == Offset::Exact && spheres.iter().any(unknown) {
             return Self::default();
         }
-        let emitted = |i: usize| luminance(scene.materials[placement.spheres[i].material].emission);
-        let picture = extent(placement);
+        let emitted = |i: usize| luminance(scene.materials[spheres[i].material].emission);
+        let picture = extent(spheres);
         let size = |s: &PlacedSphere| match s.pole {
             Some(_) => s.radius.min(picture),
             None => s.radius,
         };
-        let spheres = placement.spheres.iter().enumerate();
-        let chosen: Vec<(usize, f64)> = spheres
-            .filter(|(_, s)| is_sampled(scene, s))
-            .map(|(i, s)| (i, size(s).powi(2) * emitted(i)))
+        let chosen: Vec<(usize, f64)> = sampled(scene, spheres)
+            .into_iter()
+            .map(|i| (i, size(&spheres[i]).powi(2) * emitted(i)))
             .collect();
         let total: f64 = chosen.iter().map(|(_, power)| power).sum();
         if chosen.is_empty() || !(total > 0.0 && total.is_finite()) {
@@ -115,7 +174,7 @@ impl Lights {
                 alias,
             })
             .collect();
-        let mut places = vec![None; placement.spheres.len()];
+        let mut places = vec![None; spheres.len()];
         for (place, light) in table.iter().enumerate() {
             places[light.sphere] = Some(place);
         }

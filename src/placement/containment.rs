@@ -4,16 +4,14 @@
 
 use std::collections::HashMap;
 
-use crate::media::precedes;
-use crate::placement::Side;
-use crate::scene::Scene;
+use super::media::precedes;
+use super::sphere::{ROUNDING, Side};
+use super::tree::{Bounds, Tree};
+use crate::scene::{Scene, Sphere};
 
 /// Opaque spheres of either side that are looked at as containers: walls and shells are few and large,
 /// and a scene of millions must not take the square of its size.
 const CONTAINERS: usize = 64;
-
-/// Rounding of the sum of a distance and a radius in f64, as a share of it.
-pub const ROUNDING: f64 = 4.0 * f64::EPSILON;
 
 /// The most spheres just within one and the same dielectric, none within another of them.
 pub const MOST_CORES: usize = 4;
@@ -98,26 +96,33 @@ fn hides(scene: &Scene, wall: usize, side: Side, i: usize) -> bool {
 #[must_use]
 pub fn containers(scene: &Scene, sides: &[Side], reachable: &[bool]) -> Vec<Option<usize>> {
     let mut containers = vec![None; scene.spheres.len()];
-    let mut order: Vec<usize> = (0..scene.spheres.len()).filter(|i| reachable[*i]).collect();
-    let x = |i: usize| scene.spheres[i].center.x;
-    order.sort_by(|a, b| x(*a).total_cmp(&x(*b)));
-    for &outer in &order {
-        if sides[outer] != Side::Tracked {
-            continue;
-        }
-        // Their centres are close.
-        let reach = CLOSE * scene.spheres[outer].radius;
-        let from = order.partition_point(|i| x(*i) < x(outer) - reach);
-        let near = order[from..]
-            .iter()
-            .take_while(|i| x(**i) <= x(outer) + reach);
-        for &inner in near.filter(|i| **i != outer && sides[**i] != Side::Sign) {
-            let is_in = just_within(scene, outer, inner);
-            let tighter = |known: usize| scene.spheres[outer].radius < scene.spheres[known].radius;
-            if is_in && containers[inner].is_none_or(tighter) {
-                containers[inner] = Some(outer);
-            }
-        }
+    let sphere = |i: usize| &scene.spheres[i];
+    let placed = || (0..scene.spheres.len()).filter(|i| reachable[*i]);
+    let mut outers: Vec<usize> = placed().filter(|i| sides[*i] == Side::Tracked).collect();
+    // The tightest first, and of equal ones the first along x.
+    outers.sort_by(|a, b| {
+        let radius = sphere(*a).radius.total_cmp(&sphere(*b).radius);
+        radius.then(sphere(*a).center.x.total_cmp(&sphere(*b).center.x))
+    });
+    let balls = outers
+        .iter()
+        .map(|i| (sphere(*i).center, sphere(*i).radius));
+    let tree = Tree::new(&balls.collect::<Vec<_>>());
+    for inner in placed().filter(|i| sides[*i] != Side::Sign) {
+        let mut tightest = usize::MAX;
+        tree.search(
+            &mut tightest,
+            |tightest, bounds| {
+                (bounds.first < *tightest && may_hold(bounds, sphere(inner)))
+                    .then_some(-(bounds.first as f64))
+            },
+            |tightest, outer| {
+                if outer < *tightest && just_within(sphere(outers[outer]), sphere(inner)) {
+                    *tightest = outer;
+                }
+            },
+        );
+        containers[inner] = outers.get(tightest).copied();
     }
     // The order of surfaces is kept for all of a container's spheres or, if it is too crowded for the
     // kernel, for none: half of it would let paths out that cannot come back.
@@ -132,14 +137,25 @@ pub fn containers(scene: &Scene, sides: &[Side], reachable: &[bool]) -> Vec<Opti
 }
 
 /// Whether `inner` lies within `outer`, and their surfaces are close all around.
-fn just_within(scene: &Scene, outer: usize, inner: usize) -> bool {
-    let (outer, inner) = (&scene.spheres[outer], &scene.spheres[inner]);
+fn just_within(outer: &Sphere, inner: &Sphere) -> bool {
     let distance = outer.center.distance(inner.center);
     let difference = outer.radius - inner.radius;
     let rounding = ROUNDING * outer.radius;
+    let reach = CLOSE * outer.radius;
     difference > 0.0
         && difference - distance >= -rounding
-        && difference + distance <= CLOSE * outer.radius
+        && difference + distance <= reach
+        && inner.center.x >= outer.center.x - reach
+        && inner.center.x <= outer.center.x + reach
+}
+
+/// Whether `inner` may lie just within a sphere within the bounds.
+fn may_hold(outers: &Bounds, inner: &Sphere) -> bool {
+    let distance = outers.nearest(inner.center);
+    let [least, most] = [outers.least, outers.most].map(|radius| radius - inner.radius);
+    most > 0.0
+        && most - distance >= -(ROUNDING * outers.most)
+        && least.max(0.0) + distance <= CLOSE * outers.most
 }
 
 fn is_dielectric(scene: &Scene, i: usize) -> bool {

@@ -6,7 +6,8 @@ use std::cmp::Ordering;
 
 use glam::DVec3;
 
-use crate::containment::ROUNDING;
+use super::sphere::ROUNDING;
+use super::tree::{Bounds, Tree};
 use crate::scene::Scene;
 
 /// The most levels: the kernel keeps the set of media a path is in as the bits of a word.
@@ -45,8 +46,24 @@ struct Ball {
 }
 
 impl Ball {
+    /// Whether the two share a point. (Where they just touch beside each other along x, rounding decides twice.)
     fn meets(&self, other: &Self) -> bool {
         self.center.distance(other.center) <= self.radius + other.radius
+            && self.left() <= other.right()
+            && other.left() <= self.right()
+    }
+
+    /// Whether a ball within the bounds may meet it.
+    fn may_meet(&self, bounds: &Bounds) -> bool {
+        bounds.nearest(self.center) <= self.radius + bounds.most
+    }
+
+    fn left(&self) -> f64 {
+        self.center.x - self.radius
+    }
+
+    fn right(&self) -> f64 {
+        self.center.x + self.radius
     }
 }
 
@@ -71,22 +88,31 @@ impl Media {
             .collect();
         // From low to high precedence.
         balls.sort_by(|a, b| precedence(scene, a.source, b.source));
-        let neighbours = neighbours(&balls);
+        let places: Vec<(DVec3, f64)> = balls.iter().map(|b| (b.center, b.radius)).collect();
+        // A ball's mark is one above its level; balls of higher precedence have none yet.
+        let mut tree = Tree::new(&places);
         let mut media = Self {
             level: vec![0; scene.spheres.len()],
             ..Self::default()
         };
         for (i, ball) in balls.iter().enumerate() {
             // One above all that it meets and takes precedence over.
-            let below = neighbours[i].iter().filter(|j| **j < i);
-            let level = below
-                .map(|j| media.level[balls[*j].source] + 1)
-                .max()
-                .unwrap_or(0);
+            let mut level = 0;
+            tree.search(
+                &mut level,
+                |level, bounds| {
+                    (bounds.mark > *level && ball.may_meet(bounds)).then(|| bounds.mark.into())
+                },
+                |level, j| {
+                    if j < i && balls[j].meets(ball) {
+                        *level = (*level).max(media.level[balls[j].source] + 1);
+                    }
+                },
+            );
+            tree.mark(i, level + 1);
             media.level[ball.source] = level;
-            if let Some(j) = neighbours[i].first() {
+            if level > 0 {
                 media.levels = media.levels.max(level + 1);
-                media.example.get_or_insert([ball.source, balls[*j].source]);
             }
             if ball.center.length() < ball.radius * (1.0 - ROUNDING) {
                 media.camera.push(Medium {
@@ -96,8 +122,23 @@ impl Media {
                 });
             }
         }
+        if media.levels > 0 {
+            media.example = example(&balls, &tree);
+        }
         media
     }
+}
+
+/// The first ball that meets another, and of those that it meets the one that begins first along x.
+fn example(balls: &[Ball], tree: &Tree) -> Option<[usize; 2]> {
+    let meets_another = |i: usize| {
+        let may = |bounds: &Bounds| balls[i].may_meet(bounds).then_some(0.0);
+        tree.any(may, |j| j != i && balls[j].meets(&balls[i]))
+    };
+    let i = (0..balls.len()).find(|i| meets_another(*i))?;
+    let others = (0..balls.len()).filter(|j| *j != i && balls[*j].meets(&balls[i]));
+    let first = others.min_by(|a, b| balls[*a].left().total_cmp(&balls[*b].left()))?;
+    Some([balls[i].source, balls[first].source])
 }
 
 /// The order of two dielectrics of `scene`, from low to high precedence.
@@ -115,22 +156,4 @@ fn precedence(scene: &Scene, a: usize, b: usize) -> Ordering {
 #[must_use]
 pub fn precedes(scene: &Scene, a: usize, b: usize) -> bool {
     precedence(scene, a, b) == Ordering::Greater
-}
-
-/// For each ball the others that share a point with it: a sweep along x.
-fn neighbours(balls: &[Ball]) -> Vec<Vec<usize>> {
-    let mut found = vec![Vec::new(); balls.len()];
-    let mut order: Vec<usize> = (0..balls.len()).collect();
-    let left = |i: usize| balls[i].center.x - balls[i].radius;
-    order.sort_by(|a, b| left(*a).total_cmp(&left(*b)));
-    let mut open: Vec<usize> = Vec::new();
-    for i in order {
-        open.retain(|j| balls[*j].center.x + balls[*j].radius >= left(i));
-        for &j in open.iter().filter(|j| balls[**j].meets(&balls[i])) {
-            found[i].push(j);
-            found[j].push(i);
-        }
-        open.push(i);
-    }
-    found
 }

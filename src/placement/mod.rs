@@ -1,0 +1,149 @@
+//! Where everything is, prepared in f64 so that f32 can stand it.
+//!
+//! Points are kept as an offset from an *anchor*: the centre of a sphere, or its *pole* if the
+//! sphere is much larger than what is near it. All anchors are relative to one origin close to the
+//! camera's view, and in units of a power of two that brings the scene to size one. So a scene that
+//! is moved or scaled by a power of two gives the same numbers, and a wall of radius 1e8 keeps all
+//! its digits where the picture is.
+
+mod camera;
+pub mod containment;
+pub mod lights;
+pub mod media;
+mod pole;
+mod sphere;
+mod tree;
+mod unit;
+
+pub use camera::PlacedCamera;
+pub use lights::{Light, Lights};
+pub use media::{Media, Medium};
+pub use sphere::{PlacedSphere, Side};
+
+use glam::DVec3;
+
+use crate::scene::Scene;
+use crate::settings::Offset;
+use camera::approach;
+use containment::{containers, reachable};
+use pole::{pole_normals, pole_point};
+
+/// A scene's spheres and camera as the renderers use them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Placement {
+    /// Kernel units per scene unit, a power of two.
+    pub scale: f64,
+    /// Kernel radiance per radiance, a power of two that brings the brightest light to 2^32: sums of
+    /// squares in f32 then hold light of 1e20, and beside it light a 1e-26 of that.
+    pub light: f64,
+    /// The spheres that paths can reach, those with a pole frame first, else in scene order.
+    pub spheres: Vec<PlacedSphere>,
+    /// How many of `spheres` have a pole frame.
+    pub poles: usize,
+    /// Which dielectrics take precedence where they share points.
+    pub media: Media,
+    /// The dielectrics that the camera is in, `sphere` being an index into `spheres`.
+    pub within: Vec<Medium>,
+    /// Whether an opaque sphere is all around the camera: no path leaves it.
+    pub enclosed: bool,
+    /// Spheres of the scene that equal an earlier one, with that one: they are not there.
+    pub coincident: Vec<[usize; 2]>,
+    /// The camera.
+    pub camera: PlacedCamera,
+    /// How paths leave surfaces, distances in kernel units.
+    pub offset: Offset,
+    /// What light sampling chooses from.
+    pub lights: Lights,
+}
+
+impl Placement {
+    /// Prepares `scene` for an image of `width` x `height` pixels.
+    #[must_use]
+    pub fn new(scene: &Scene, width: u32, height: u32) -> Self {
+        Self::with_offset(scene, width, height, Offset::Exact)
+    }
+
+    /// The same for paths that leave surfaces by `offset`.
+    #[must_use]
+    pub fn with_offset(scene: &Scene, width: u32, height: u32, offset: Offset) -> Self {
+        let eye = scene.camera.position;
+        let forward = (scene.camera.look_at - eye).normalize();
+        let approach = approach(scene, forward);
+        let origin = eye + approach * forward;
+        // In units of the origin from here on: the subtraction in f64 is the last place that sees
+        // world coordinates.
+        let centers: Vec<DVec3> = scene.spheres.iter().map(|s| s.center - origin).collect();
+        let count = centers.len();
+        let mut coincident = Vec::new();
+        let (sides, reachable, containers) = if offset == Offset::Exact {
+            let sides: Vec<Side> = (0..count).map(|i| Side::of(scene, i)).collect();
+            let reachable = reachable(scene, &sides, &mut coincident);
+            let containers = containers(scene, &sides, &reachable);
+            (sides, reachable, containers)
+        } else {
+            (
+                vec![Side::Sign; count],
+                vec![true; count],
+                vec![None; count],
+            )
+        };
+        let media = Media::new(scene, &reachable);
+        let mut order: Vec<usize> = (0..count).filter(|i| reachable[*i]).collect();
+        let poles = pole_normals(scene, &centers, &order);
+        let scale = unit::length(scene, &centers, &poles, &order);
+        order.sort_by_key(|i| (poles[*i].is_none(), *i));
+        let mut place = vec![None; count];
+        for (at, source) in order.iter().enumerate() {
+            place[*source] = Some(at);
+        }
+        let mut spheres: Vec<PlacedSphere> = order
+            .iter()
+            .map(|&i| {
+                let sphere = &scene.spheres[i];
+                let normal = poles[i];
+                let anchor =
+                    normal.map_or(centers[i], |n| pole_point(centers[i], sphere.radius, n));
+                PlacedSphere {
+                    source: i,
+                    material: sphere.material,
+                    anchor: anchor * scale,
+                    radius: sphere.radius * scale,
+                    pole: normal,
+                    side: sides[i],
+                    level: media.level[i],
+                    container: containers[i].and_then(|c| place[c]),
+                    cores: Vec::new(),
+                }
+            })
+            .collect();
+        for inner in 0..spheres.len() {
+            if let Some(outer) = spheres[inner].container
+                && spheres[inner].side == Side::Tracked
+            {
+                spheres[outer].cores.push(inner);
+            }
+        }
+        let within = media.camera.iter().filter_map(|medium| {
+            let sphere = place[medium.sphere]?;
+            Some(Medium { sphere, ..*medium })
+        });
+        let within = within.collect();
+        let enclosed = spheres.iter().any(|s| s.side == Side::Inside);
+        let poles = spheres.iter().filter(|s| s.pole.is_some()).count();
+        let camera = PlacedCamera::new(scene, forward, approach, scale, width, height);
+        let offset = offset.scaled(scale);
+        Self {
+            scale,
+            light: unit::radiance(scene, &order, enclosed),
+            enclosed,
+            coincident,
+            lights: Lights::new(scene, &spheres, offset),
+            spheres,
+            poles,
+            media,
+            within,
+            camera,
+            offset,
+        }
+    }
+}

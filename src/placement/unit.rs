@@ -1,0 +1,42 @@
+//! Units: powers of two that bring a scene's lengths and its light to numbers that f32 can stand.
+
+use glam::DVec3;
+
+use super::pole::pole_point;
+use crate::scene::Scene;
+
+/// The power of two that brings the extent of the spheres `all`, without those in pole frames, to [1, 2).
+pub(super) fn length(
+    scene: &Scene,
+    centers: &[DVec3],
+    poles: &[Option<DVec3>],
+    all: &[usize],
+) -> f64 {
+    let extent = all
+        .iter()
+        .map(|&i| match poles[i] {
+            Some(n) => pole_point(centers[i], scene.spheres[i].radius, n).length(),
+            None => centers[i].length() + scene.spheres[i].radius,
+        })
+        .fold(0.0, f64::max);
+    if extent > 0.0 {
+        (-extent.log2().floor()).exp2()
+    } else {
+        1.0
+    }
+}
+
+/// The unit of radiance for the reachable spheres `all`.
+pub(super) fn radiance(scene: &Scene, all: &[usize], enclosed: bool) -> f64 {
+    let emission = |i: &usize| scene.materials[scene.spheres[*i].material].emission;
+    let brightest = all
+        .iter()
+        .map(emission)
+        .chain(scene.environment.filter(|_| !enclosed))
+        .fold(0.0, |most: f64, radiance| most.max(radiance.max_element()));
+    if brightest > 0.0 {
+        (32.0 - brightest.log2().floor()).exp2()
+    } else {
+        1.0
+    }
+}
