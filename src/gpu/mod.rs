@@ -1,8 +1,11 @@
-//! The GPU: adapters, buffer layouts, and the renderer.
+//! The GPU: adapters, an engine that runs passes on them, the layouts of what it uploads, and the renderer.
 
 mod aov;
+mod data;
 pub mod device;
+mod engine;
 pub mod layout;
+mod pace;
 pub mod probe;
+mod region;
 pub mod renderer;
-mod upload;

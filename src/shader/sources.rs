@@ -18,6 +18,7 @@ sources![
     "core/sum",
     "scene/ray",
     "scene/sphere",
+    "scene/data",
     "scene/list",
     "scene/priority",
     "scene/material",
