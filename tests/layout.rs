@@ -154,6 +154,8 @@ fn glsl_has_the_same_layouts() {
             assert_eq!(faults, [""; 0], "{stage:?} of {names:?}");
         }
     }
+    // With lights in the scene's data.
+    assert_eq!(other_in_glsl(&kernel(Stage::Path, &FULL).module), [""; 0]);
 }
 
 #[test]
@@ -163,6 +165,10 @@ fn companion_what_glsl_would_move_is_found() {
         ("@size(8) a: f32, b: f32", "storage, read"),
         ("@align(16) a: f32", "storage, read"),
         ("a: array<vec4f, 2>", "uniform"),
+        (
+            "a: array<f32, 3>, @align(16) b: array<u32, 2>",
+            "storage, read",
+        ),
     ] {
         let faults = |members: &str| {
             let wgsl =
@@ -416,4 +422,34 @@ fn attributes_agree() {
         // The renderer writes words without padding.
         assert_eq!(size as usize, 4 * expected.len());
     }
+}
+
+/// Each array has room for exactly what the host writes: an empty scene has one of each.
+#[test]
+fn the_scenes_data_agree() {
+    let kernel = kernel(Stage::Path, &FULL);
+    let (members, size) = device(&kernel, "SceneData");
+    let mut end = 0;
+    let expected = [
+        ("spheres", "Sphere", size_of::<SphereRecord>() as u32),
+        ("poles", "Pole", size_of::<PoleRecord>() as u32),
+        ("attributes", "Attributes", 12),
+        ("materials", "Material", device(&kernel, "Material").1),
+        ("lights", "Light", size_of::<LightRecord>() as u32),
+    ];
+    for ((name, offset), (member, record, stride)) in members.iter().zip(expected) {
+        assert_eq!((name.as_str(), device(&kernel, record).1), (member, stride));
+        assert!(
+            (end..end + 16).contains(offset),
+            "{name} at {offset}, not {end}"
+        );
+        end = offset + stride;
+    }
+    assert_eq!(
+        (members.len(), size),
+        (expected.len(), end.next_multiple_of(16))
+    );
+    // Without lights, poles and spheres in a list there is nothing to read.
+    let baked = self::kernel(Stage::Path, &["baked", "bsdf", "diffuse"]);
+    assert_eq!(baked.struct_members("SceneData"), None);
 }

@@ -1,6 +1,6 @@
 //! Limits of drivers: llvmpipe, lavapipe's machine, ends every loop in silence after 65535 iterations
-//! of all loops of an invocation. Renders that need more take several dispatches, or fail loudly. And of
-//! textures: large images are rendered in parts.
+//! of all loops of an invocation. Renders that need more take several dispatches, or fail loudly. Of
+//! textures: large images are rendered in parts. And of bindings: a pass may have eight storage buffers.
 
 mod common;
 
@@ -8,13 +8,22 @@ use std::cell::RefCell;
 use std::ops::Range;
 use std::time::Duration;
 
-use common::{gpu_renderer, means, render_cpu, render_gpu, scene, settings};
+use common::{
+    gpu_renderer, means, render_cpu, render_gpu, scene, scene_file, scene_files, settings,
+};
 use gpu_trace::allocation::Tiles;
+use gpu_trace::effects::Effects;
 use gpu_trace::error::{Error, Result};
 use gpu_trace::film::{Film, PixelSums, Tally, Window};
+use gpu_trace::gpu::device::STORAGE_BUFFERS;
 use gpu_trace::gpu::renderer::DispatchLimits;
+use gpu_trace::placement::Placement;
 use gpu_trace::render::{Control, Renderer, Status, StoppedBy, Watch, render, render_quietly};
-use gpu_trace::settings::{Rect, Settings};
+use gpu_trace::sampler::Sampler;
+use gpu_trace::scene::Scene;
+use gpu_trace::settings::{GeometryChoice, Integrator, LightSampling, Rect, Settings};
+use gpu_trace::shader::steps::{LOOPS, vertex_steps};
+use gpu_trace::shader::{Kernel, Stage, link};
 
 /// A closed furnace that keeps all light.
 const FURNACE: &str = "
@@ -248,4 +257,149 @@ fn a_window_cut_short_is_the_last() {
     let outcome = render_quietly(&mut Short, &settings).expect("an image");
     assert_eq!(outcome.stopped_by, StoppedBy::Time);
     assert_eq!(outcome.film.samples(), 24);
+}
+
+/// The kernel of a scene with these settings, and its effects.
+fn kernel(scene: &Scene, settings: &Settings) -> (Kernel, Placement, Effects) {
+    let placement = Placement::with_offset(scene, settings.width, settings.height, settings.offset);
+    let effects = Effects::derive(scene, &placement, settings);
+    let kernel = link(Stage::Path, scene, &placement, &effects).unwrap_or_else(|e| panic!("{e}"));
+    (kernel, placement, effects)
+}
+
+/// The kernels of every scene: with as few and with as many effects as settings can bring, in both forms.
+fn kernels(scene: &Scene) -> Vec<(Kernel, Placement, Effects)> {
+    let few = Settings {
+        integrator: Integrator::Lecture { termination: 0.2 },
+        sampler: Sampler::Independent,
+        ..Settings::for_scene(scene)
+    };
+    let many = Settings {
+        adaptive: true,
+        classes: true,
+        features: true,
+        ..Settings::for_scene(scene)
+    };
+    let table = Settings {
+        light_sampling: LightSampling::Cone,
+        ..many.clone()
+    };
+    let mut all = Vec::new();
+    for settings in [few, many, table] {
+        for geometry in [GeometryChoice::Auto, GeometryChoice::List] {
+            let settings = Settings {
+                geometry,
+                ..settings.clone()
+            };
+            all.push(kernel(scene, &settings));
+        }
+    }
+    all
+}
+
+/// Five of eight stay free for what comes: trees, pilots, caches.
+#[test]
+fn few_storage_buffers_are_bound() {
+    let mut most = 0;
+    for file in scene_files() {
+        let scene = scene_file(&file);
+        for (kernel, _, effects) in kernels(&scene) {
+            let bindings = kernel.bindings("render");
+            let buffers = bindings.iter().filter(|b| b.storage_buffer).count();
+            let names: Vec<_> = effects.names().collect();
+            let binds_scene = bindings.iter().any(|b| b.name == "scene");
+            assert_eq!(
+                buffers,
+                if binds_scene { 3 } else { 2 },
+                "{file:?} with {names:?}"
+            );
+            let reads_scene = effects.has("list") || effects.has("table");
+            assert_eq!(binds_scene, reads_scene, "{file:?} with {names:?}");
+            most = most.max(buffers);
+        }
+    }
+    // What adapters are asked for is what is needed.
+    assert_eq!(most, STORAGE_BUFFERS as usize);
+}
+
+/// Bindings are numbered without gaps, in the order of their names, and a pass binds only what it uses.
+#[test]
+fn bindings_are_found_by_name() {
+    let scene = scene(&cloud(100));
+    let (kernel, ..) = kernel(&scene, &Settings::for_scene(&scene));
+    let mut bindings = kernel.bindings("render");
+    bindings.sort_by_key(|b| b.number);
+    let numbers: Vec<u32> = bindings.iter().map(|b| b.number).collect();
+    assert_eq!(numbers, (0..bindings.len() as u32).collect::<Vec<_>>());
+    let mut names: Vec<&str> = bindings.iter().map(|b| b.name.as_str()).collect();
+    names.sort_unstable();
+    let expected = [
+        "counters",
+        "deviations",
+        "dispatch",
+        "partials",
+        "scene",
+        "sum_high",
+        "sum_low",
+        "view",
+    ];
+    assert_eq!(names, expected);
+    assert_eq!(kernel.bindings("no entry point"), []);
+    let probe = common::probe(&["list", "bsdf"]);
+    let names = |entry: &str| {
+        let bindings = probe.kernel().bindings(entry);
+        let mut names: Vec<String> = bindings.into_iter().map(|b| b.name).collect();
+        names.sort_unstable();
+        names
+    };
+    assert_eq!(names("probe_rounding"), ["inputs", "outputs", "shape"]);
+    assert_eq!(
+        names("probe_camera_ray"),
+        ["inputs", "outputs", "shape", "view"]
+    );
+}
+
+/// The functions with a loop that the account knows, for these effects.
+fn accounted(effects: &Effects) -> Vec<&'static str> {
+    let used = LOOPS.iter().filter(|l| (l.used)(effects));
+    let mut functions: Vec<&str> = used.map(|l| l.function).collect();
+    functions.sort_unstable();
+    functions
+}
+
+#[test]
+fn every_loop_is_accounted_for() {
+    let mut longest = 0;
+    for file in scene_files() {
+        let scene = scene_file(&file);
+        for (kernel, _, effects) in kernels(&scene) {
+            let mut loops = kernel.loops();
+            loops.sort_unstable();
+            let names: Vec<_> = effects.names().collect();
+            assert_eq!(loops, accounted(&effects), "{file:?} with {names:?}");
+            longest = longest.max(loops.len());
+        }
+    }
+    // One with all the loops that there are was among them.
+    assert_eq!(longest, LOOPS.len());
+}
+
+#[test]
+fn companion_a_loop_that_is_not_accounted_for_is_found() {
+    let scene = scene(&cloud(100));
+    let settings = |geometry| Settings {
+        geometry,
+        ..Settings::for_scene(&scene)
+    };
+    let (list, placement, in_list) = kernel(&scene, &settings(GeometryChoice::List));
+    let (baked, _, in_baked) = kernel(&scene, &settings(GeometryChoice::Baked));
+    assert_eq!(baked.loops(), accounted(&in_baked));
+    assert_ne!(list.loops(), accounted(&in_baked));
+    // 100 spheres, eight an iteration, of which the first may have a pole frame; the ends of the loops, and
+    // the loop over vertices.
+    let poles = placement.poles as u32;
+    let ends = 1 + u32::from(in_list.has("pole"));
+    let spheres = poles + (100 - poles).div_ceil(8);
+    assert_eq!(vertex_steps(&placement, &in_list), spheres + ends + 1);
+    assert_eq!(vertex_steps(&placement, &in_baked), 1);
 }

@@ -122,6 +122,9 @@ fn summarize(index: usize, adapter: &wgpu::Adapter) -> AdapterSummary {
     }
 }
 
+/// The most storage buffers that a pass may bind. Devices have eight; the others are left for what comes.
+pub const STORAGE_BUFFERS: u32 = 3;
+
 /// What the kernel needs and the adapter does not have.
 fn lacks(adapter: &wgpu::Adapter, limits: &wgpu::Limits) -> Option<String> {
     let flags = adapter.get_downlevel_capabilities().flags;
@@ -144,7 +147,7 @@ fn lacks(adapter: &wgpu::Adapter, limits: &wgpu::Limits) -> Option<String> {
         (
             "storage buffers a stage",
             limits.max_storage_buffers_per_shader_stage,
-            7,
+            STORAGE_BUFFERS,
         ),
         (
             "invocations a workgroup",

@@ -1,9 +1,12 @@
-//! The GPU: adapters, buffer layouts, and the renderer.
+//! The GPU: adapters, an engine that runs passes on them, the layouts of what it uploads, and the renderer.
 
 mod aov;
 pub mod bsdf_probe;
+mod data;
 pub mod device;
+mod engine;
 pub mod layout;
+mod pace;
 pub mod probe;
+mod region;
 pub mod renderer;
-mod upload;

@@ -3,8 +3,10 @@
 //! The only module that knows WESL.
 
 mod baked;
+mod binding;
 mod bsdf;
 mod sources;
+pub mod steps;
 
 pub(crate) use bsdf::members as material_members;
 
@@ -16,6 +18,8 @@ use crate::materials;
 use crate::placement::{Medium, Placement};
 use crate::scene::Scene;
 
+pub use binding::Binding;
+
 /// A linked and validated kernel.
 #[derive(Debug)]
 pub struct Kernel {
@@ -23,17 +27,34 @@ pub struct Kernel {
     pub wgsl: String,
     /// The same as naga understands it, for reflection.
     pub module: naga::Module,
+    /// What its functions use.
+    info: naga::valid::ModuleInfo,
 }
 
 impl Kernel {
-    /// Whether the kernel has a resource at `binding` of group 0.
+    /// What the entry point `entry` binds, in no order; nothing if there is no such entry point.
     #[must_use]
-    pub fn has_binding(&self, binding: u32) -> bool {
-        self.module.global_variables.iter().any(|(_, variable)| {
-            variable
-                .binding
-                .is_some_and(|b| b.group == 0 && b.binding == binding)
-        })
+    pub fn bindings(&self, entry: &str) -> Vec<Binding> {
+        binding::of(&self.module, &self.info, entry)
+    }
+
+    /// For every loop the name in the sources of the function or entry point that it is in.
+    #[must_use]
+    pub fn loops(&self) -> Vec<String> {
+        let functions = self.module.functions.iter().map(|(_, function)| function);
+        let entries = self
+            .module
+            .entry_points
+            .iter()
+            .map(|e| (&e.name, &e.function));
+        let named = functions.filter_map(|f| Some((f.name.as_ref()?, f)));
+        named
+            .chain(entries)
+            .flat_map(|(name, function)| {
+                let count = steps::loops_in(&function.body);
+                std::iter::repeat_n(binding::source_name(name), count)
+            })
+            .collect()
     }
 
     /// Name, offset and size in bytes of every member of the struct type `name` (as the linker
@@ -114,30 +135,31 @@ pub fn link(
         Stage::Path => "path",
         Stage::Probe => "probe",
     };
-    let wgsl = compiler
+    let mut linked = compiler
         .compile(&module_path(root))
-        .map_err(|e| Error::Shader(format!("the kernel does not link: {e}")))?
-        .to_string();
+        .map_err(|e| Error::Shader(format!("the kernel does not link: {e}")))?;
+    binding::number(&mut linked.syntax);
+    let wgsl = linked.to_string();
     // The linker's order varies from run to run; declarations may stand in any.
     let mut declarations: Vec<&str> = wgsl.split("\n\n").map(str::trim).collect();
     declarations.sort_unstable();
     let wgsl = declarations.join("\n\n") + "\n";
-    let module = validate(&wgsl)?;
-    Ok(Kernel { wgsl, module })
+    let (module, info) = validate(&wgsl)?;
+    Ok(Kernel { wgsl, module, info })
 }
 
 /// Parses and validates WGSL with naga.
 ///
 /// # Errors
 /// [`Error::Shader`] with the place in the source.
-pub fn validate(wgsl: &str) -> Result<naga::Module> {
+fn validate(wgsl: &str) -> Result<(naga::Module, naga::valid::ModuleInfo)> {
     let module = naga::front::wgsl::parse_str(wgsl).map_err(|e| {
         Error::Shader(format!(
             "the kernel is not WGSL: {}",
             e.emit_to_string(wgsl)
         ))
     })?;
-    naga::valid::Validator::new(
+    let info = naga::valid::Validator::new(
         naga::valid::ValidationFlags::all(),
         naga::valid::Capabilities::empty(),
     )
@@ -148,7 +170,7 @@ pub fn validate(wgsl: &str) -> Result<naga::Module> {
             e.emit_to_string(wgsl)
         ))
     })?;
-    Ok(module)
+    Ok((module, info))
 }
 
 fn module_path(path: &str) -> ModulePath {
@@ -157,46 +179,19 @@ fn module_path(path: &str) -> ModulePath {
         .expect("a literal path of this crate")
 }
 
-/// The most loop iterations of an invocation in one dispatch: llvmpipe, lavapipe's machine, ends
-/// every loop in silence after 65535 iterations of all loops together.
-pub const LOOP_ITERATIONS: u64 = 65_000;
-
-/// Loop iterations that the kernel makes for one ray.
-#[must_use]
-pub fn ray_steps(placement: &Placement, effects: &Effects) -> u32 {
-    if effects.has(Effect::Baked) {
-        return 1;
-    }
-    let others = placement.spheres.len() - placement.poles;
-    // One a pole sphere, one for eight others, and one to leave each loop; with light sampling there
-    // are two rays a vertex.
-    let ray = placement.poles + others.div_ceil(8) + 2;
-    let rays = if effects.has(Effect::Lights) { 2 } else { 1 };
-    // And the path loop's own.
-    (rays * ray + 1 + light_steps(placement, effects)) as u32
-}
-
-/// Loop iterations to choose a light, with one to leave the loop.
-fn light_steps(placement: &Placement, effects: &Effects) -> usize {
-    if effects.weighs_lights() && effects.has(Effect::List) {
-        placement.lights.table.len() + 1
-    } else {
-        0
-    }
-}
-
 /// The module `config`: sizes and constants of this scene.
 fn config(scene: &Scene, placement: &Placement, effects: &Effects) -> String {
     let mut text = String::new();
     if effects.has(Effect::List) {
         text += &format!("const SPHERE_COUNT: u32 = {}u;\n", placement.spheres.len());
+        text += &format!("const MATERIAL_COUNT: u32 = {}u;\n", scene.materials.len());
         if effects.has(Effect::Pole) {
             text += &format!("const POLE_COUNT: u32 = {}u;\n", placement.poles);
         }
     }
     text += &format!(
         "const RAY_STEPS: u32 = {}u;\n",
-        ray_steps(placement, effects)
+        steps::vertex_steps(placement, effects)
     );
     if effects.has(Effect::Environment) {
         let radiance = scene.environment.unwrap_or_default() * placement.light;

@@ -38,6 +38,7 @@ sources![
     "sampler/purpose",
     "sampler/sobol",
     "scene/camera",
+    "scene/data",
     "scene/list",
     "scene/media/nested",
     "scene/media/single",

@@ -1,0 +1,90 @@
+//! The account of the kernel's loops, for drivers that count iterations.
+//!
+//! llvmpipe, lavapipe's machine, counts the iterations of all loops of an invocation together, and
+//! after 65535 ends every loop in silence. So every loop that a scene can lengthen is in [`LOOPS`],
+//! the only place that says how long it is. The kernel adds up what its vertices cost and starts no
+//! further path beyond a limit that leaves room for one more; the host dispatches again.
+//!
+//! A tree's loop will have no length that is known beforehand. It counts itself: its iterations come
+//! back with the hit, the loop over vertices adds them to `steps` as it adds RAY_STEPS, and its row here
+//! is the most that a ray can take, all nodes, so that the room for one more path is kept.
+
+use crate::effects::{Effect, Effects};
+use crate::placement::Placement;
+
+/// The most loop iterations that an invocation is to make in one dispatch: below the 65535 after which
+/// llvmpipe ends every loop.
+pub const LOOP_ITERATIONS: u64 = 65_000;
+
+/// Spheres that an iteration of the loop over spheres about their centres tests.
+const SPHERES_AN_ITERATION: usize = 8;
+
+/// One loop of the path tracer's kernel.
+#[derive(Debug)]
+pub struct Loop {
+    /// The function that it is in, as in `shaders/`.
+    pub function: &'static str,
+    /// Whether a kernel with these effects has it.
+    pub used: fn(&Effects) -> bool,
+    /// Most iterations at a vertex, with one to leave the loop for each time it is run.
+    pub at_vertex: fn(&Placement, &Effects) -> usize,
+}
+
+/// All loops of the path tracer's kernel.
+pub const LOOPS: [Loop; 4] = [
+    // Over vertices.
+    Loop {
+        function: "render",
+        used: |_| true,
+        at_vertex: |_, _| 1,
+    },
+    // Over spheres about their poles.
+    Loop {
+        function: "closest_hit",
+        used: |effects| effects.has(Effect::List) && effects.has(Effect::Pole),
+        at_vertex: |placement, effects| rays(effects) * (placement.poles + 1),
+    },
+    // Over the others.
+    Loop {
+        function: "closest_hit",
+        used: |effects| effects.has(Effect::List),
+        at_vertex: |placement, effects| {
+            let spheres = placement.spheres.len() - placement.poles;
+            rays(effects) * (spheres.div_ceil(SPHERES_AN_ITERATION) + 1)
+        },
+    },
+    // Over the lights that are weighed.
+    Loop {
+        function: "weigh_lights",
+        used: |effects| effects.weighs_lights() && effects.has(Effect::List),
+        at_vertex: |placement, _| placement.lights.table.len().max(1) + 1,
+    },
+];
+
+/// Rays that are traced at a vertex: with light sampling also one to a light.
+fn rays(effects: &Effects) -> usize {
+    1 + usize::from(effects.has(Effect::Lights))
+}
+
+/// Most loop iterations that the kernel makes for one vertex of a path.
+#[must_use]
+pub fn vertex_steps(placement: &Placement, effects: &Effects) -> u32 {
+    let loops = LOOPS.iter().filter(|l| (l.used)(effects));
+    let steps: usize = loops.map(|l| (l.at_vertex)(placement, effects)).sum();
+    steps as u32
+}
+
+/// Loops of a block, those within others among them.
+pub(super) fn loops_in(block: &naga::Block) -> usize {
+    use naga::Statement;
+    let inner = |statement: &Statement| match statement {
+        Statement::Block(block) => loops_in(block),
+        Statement::If { accept, reject, .. } => loops_in(accept) + loops_in(reject),
+        Statement::Switch { cases, .. } => cases.iter().map(|case| loops_in(&case.body)).sum(),
+        Statement::Loop {
+            body, continuing, ..
+        } => 1 + loops_in(body) + loops_in(continuing),
+        _ => 0,
+    };
+    block.iter().map(inner).sum()
+}
