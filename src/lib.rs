@@ -4,12 +4,13 @@
 //! decided:
 //!
 //! 1. [`cli`]: what was typed.
-//! 2. [`settings`]: what will be rendered, validated. [`sampler`]: which samples are placed together.
+//! 2. [`settings`]: how it will be rendered. [`sampler`]: which samples are placed together.
 //! 3. [`scene`]: the scene file, validated.
 //! 4. [`placement`]: where everything is, in f64, relative to where the picture is.
 //!    [`lights`]: what light sampling chooses from.
 //!    [`media`]: which of several dielectrics fills the space. [`containment`]: what lies in what.
 //! 5. [`effects`]: what the scene asks for; nothing else goes into the kernel.
+//!    [`job`]: all of these, checked: renderers are made of jobs only. [`claims`]: what its estimator claims.
 //! 6. [`shader`]: the kernel, linked for these effects from `shaders/`.
 //! 7. [`gpu`] and [`reference`](mod@reference): two renderers, wgpu in f32 and the CPU in f64, that
 //!    trace the same paths. [`backend`]: one of them, opened.
@@ -29,6 +30,7 @@ pub mod allocation;
 pub mod aov;
 pub mod backend;
 pub mod check;
+pub mod claims;
 pub mod cli;
 pub mod compare;
 pub mod containment;
@@ -40,6 +42,7 @@ pub mod forecast;
 pub mod gpu;
 pub mod input;
 pub mod intervals;
+pub mod job;
 pub mod ledger;
 pub mod lights;
 pub mod media;

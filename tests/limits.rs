@@ -8,7 +8,7 @@ use std::cell::RefCell;
 use std::ops::Range;
 use std::time::Duration;
 
-use common::{gpu_renderer, means, render_cpu, render_gpu, scene, settings};
+use common::{gpu_renderer, job, means, render_cpu, render_gpu, scene, settings};
 use gpu_trace::allocation::Tiles;
 use gpu_trace::error::{Error, Result};
 use gpu_trace::film::{Film, PixelSums, Tally, Window};
@@ -144,7 +144,7 @@ fn large_images_stop_between_their_parts() {
             paths: 0,
             late: 0,
         };
-        let outcome = render(&mut renderer(), &settings, &mut watch);
+        let outcome = render(&mut renderer(), &job(&scene, &settings), &mut watch);
         assert_eq!(outcome.stopped_by, StoppedBy::Interrupt);
         let done = outcome.film.samples();
         let first = samples < 16.0;

@@ -9,6 +9,7 @@ use crate::film::Film;
 use crate::gpu::device::Gpu;
 use crate::gpu::probe::Probe;
 use crate::gpu::renderer::GpuRenderer;
+use crate::job::prepare;
 use crate::placement::Placement;
 use crate::reference::path::ReferenceRenderer;
 use crate::render::render_quietly;
@@ -92,11 +93,8 @@ impl Context {
     /// # Errors
     /// If the device fails.
     pub fn render(&self, scene: &Scene, settings: &Settings) -> Result<Film> {
-        let placement =
-            Placement::with_offset(scene, settings.width, settings.height, settings.offset);
-        let effects = Effects::derive(scene, &placement, settings);
-        let gpu = self.gpu.clone();
-        let mut renderer = GpuRenderer::new(gpu, scene, &placement, &effects, settings)?;
+        let job = prepare(scene, settings)?;
+        let mut renderer = GpuRenderer::new(self.gpu.clone(), &job)?;
         Ok(render_quietly(&mut renderer, settings)?.film)
     }
 
@@ -109,8 +107,7 @@ impl Context {
             offset: Offset::Exact,
             ..settings.clone()
         };
-        let placement = Placement::new(scene, settings.width, settings.height);
-        let mut renderer = ReferenceRenderer::new(scene, &placement, &settings, 0)?;
+        let mut renderer = ReferenceRenderer::new(&prepare(scene, &settings)?, 0)?;
         Ok(render_quietly(&mut renderer, &settings)?.film)
     }
 }

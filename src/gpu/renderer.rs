@@ -9,18 +9,16 @@ use wgpu::util::DeviceExt as _;
 
 use crate::allocation::{TILE, Tiles};
 use crate::aov::AovSums;
-use crate::effects::Effects;
 use crate::error::{Error, Result};
 use crate::film::{BLOCK, NonFinite, PixelSums, Tally, Window};
 use crate::gpu::aov::AovLayout;
 use crate::gpu::device::Gpu;
 use crate::gpu::layout::{CameraRecord, ChosenTiles, CountersRecord, DispatchRecord};
 use crate::gpu::upload::Uploads;
-use crate::placement::Placement;
+use crate::job::Job;
 use crate::render::{Control, Renderer};
 use crate::sampler::Sampler;
-use crate::scene::Scene;
-use crate::settings::{Integrator, Rect, Settings, stream_words};
+use crate::settings::{Integrator, Rect, stream_words};
 use crate::shader::{Kernel, LOOP_ITERATIONS, Stage, link, ray_steps};
 
 /// Longest side of a region, the unit of memory: images beyond it are rendered in pieces. A multiple of
@@ -101,13 +99,9 @@ impl GpuRenderer {
     ///
     /// # Errors
     /// [`Error::Gpu`] if the image or the scene is beyond a limit of the device, or it fails.
-    pub fn new(
-        gpu: Gpu,
-        scene: &Scene,
-        placement: &Placement,
-        effects: &Effects,
-        settings: &Settings,
-    ) -> Result<Self> {
+    pub fn new(gpu: Gpu, job: &Job) -> Result<Self> {
+        let (scene, settings) = (job.scene(), job.settings());
+        let (placement, effects) = (job.placement(), job.effects());
         let kernel = link(Stage::Path, scene, placement, effects)?;
         let device = &gpu.device;
         let (_, partial_size) = kernel
