@@ -104,12 +104,14 @@ fn excess(films: &[Film], share: f64) -> f64 {
     let all: Vec<Vec<[f64; 2]>> = films.iter().map(values).collect();
     let mut excess = Vec::new();
     for [a, b, c, d] in [[0, 1, 2, 3], [2, 3, 0, 1]] {
-        let other = |i: usize| all[c][i][1] + all[d][i][1];
-        let pixels = all[0].len();
-        let mean = (0..pixels).map(other).sum::<f64>() / pixels as f64;
-        for i in 0..pixels {
-            let [[x, vx], [y, vy]] = [all[a][i], all[b][i]];
-            excess.push(((x - y).powi(2) - share * (vx + vy)) / (other(i) + 0.1 * mean));
+        let other: Vec<f64> = all[c]
+            .iter()
+            .zip(&all[d])
+            .map(|(x, y)| x[1] + y[1])
+            .collect();
+        let mean = other.iter().sum::<f64>() / other.len() as f64;
+        for (([x, vx], [y, vy]), other) in all[a].iter().zip(&all[b]).zip(&other) {
+            excess.push(((x - y).powi(2) - share * (vx + vy)) / (other + 0.1 * mean));
         }
     }
     let (mean, error) = mean_and_error(&excess);

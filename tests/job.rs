@@ -114,10 +114,10 @@ fn settings_out_of_range_are_refused_and_their_neighbours_are_not() {
 #[test]
 fn a_scene_too_large_to_bake_is_refused() {
     let mut scene = lamps();
-    let sphere = scene.spheres[0].clone();
+    let sphere = scene.spheres[0];
     let fill = |scene: &mut Scene, range: Range<u32>| {
         for i in range {
-            let mut sphere = sphere.clone();
+            let mut sphere = sphere;
             sphere.center.x += f64::from(i);
             scene.spheres.push(sphere);
         }
