@@ -10,11 +10,11 @@ mod offsets;
 
 use std::time::Instant;
 
-use gpu_trace::effects::Effects;
+use gpu_trace::effects::Effect;
 use gpu_trace::film::Film;
 use gpu_trace::gpu::device::{self, DeviceChoice};
 use gpu_trace::gpu::renderer::GpuRenderer;
-use gpu_trace::placement::Placement;
+use gpu_trace::job::prepare;
 use gpu_trace::render::render_quietly;
 use gpu_trace::sampler::Sampler;
 use gpu_trace::scene::{Scene, builtin};
@@ -75,15 +75,14 @@ fn ours(
         ..Settings::for_scene(scene)
     };
     change(&mut settings);
-    let placement = Placement::with_offset(scene, settings.width, settings.height, settings.offset);
-    let mut effects = Effects::derive(scene, &placement, &settings);
+    let mut job = prepare(scene, &settings).unwrap_or_else(|e| panic!("{e}"));
     if !with.is_empty() {
-        let names: Vec<&'static str> = effects.names().chain(with.iter().copied()).collect();
-        effects = Effects::of(scene, &placement, &settings, &names);
+        let effect =
+            |name: &&str| Effect::named(name).unwrap_or_else(|| panic!("no effect {name}"));
+        job = job.with_effects(&with.iter().map(effect).collect::<Vec<_>>());
     }
     let gpu = device::open(&DeviceChoice::Best).unwrap_or_else(|e| panic!("{e}"));
-    let mut renderer = GpuRenderer::new(gpu, scene, &placement, &effects, &settings)
-        .unwrap_or_else(|e| panic!("{e}"));
+    let mut renderer = GpuRenderer::new(gpu, &job).unwrap_or_else(|e| panic!("{e}"));
     let paths =
         settings.crop.pixels() as f64 * (settings.samples.end - settings.samples.start) as f64;
     Box::new(move || {
@@ -95,11 +94,9 @@ fn ours(
 
 /// One render by our kernel.
 fn film_of(scene: &Scene, settings: &Settings) -> Film {
-    let placement = Placement::with_offset(scene, settings.width, settings.height, settings.offset);
-    let effects = Effects::derive(scene, &placement, settings);
+    let job = prepare(scene, settings).unwrap_or_else(|e| panic!("{e}"));
     let gpu = device::open(&DeviceChoice::Best).unwrap_or_else(|e| panic!("{e}"));
-    let mut renderer = GpuRenderer::new(gpu, scene, &placement, &effects, settings)
-        .unwrap_or_else(|e| panic!("{e}"));
+    let mut renderer = GpuRenderer::new(gpu, &job).unwrap_or_else(|e| panic!("{e}"));
     let outcome = render_quietly(&mut renderer, settings).unwrap_or_else(|e| panic!("{e}"));
     outcome.film
 }

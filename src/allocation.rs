@@ -1,11 +1,14 @@
 //! Where samples go: how many each tile of the image gets (`--adaptive`).
 
 use crate::estimate::Estimate;
-use crate::film::Film;
+use crate::film::{Film, LEAST_SAMPLES};
 use crate::settings::Rect;
 
 /// Pixels along the side of a tile: the kernel's workgroup.
 pub const TILE: u32 = 8;
+
+/// Samples a pixel of a pilot: as many as its error needs to be known.
+pub const PILOT_SAMPLES: u64 = LEAST_SAMPLES;
 
 /// Tiles get 2^step times the samples of those that get least, with a step of up to this.
 const STEPS: u8 = 4;

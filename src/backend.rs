@@ -1,16 +1,57 @@
 //! What renders: an opened GPU, or the CPU reference.
 
+use serde::{Deserialize, Serialize};
+
 use crate::aov::AovSums;
-use crate::effects::Effects;
 use crate::error::{Error, Result};
-use crate::gpu::device::Gpu;
+use crate::gpu::device::{self, DRIVER_ADVICE, DeviceChoice, Gpu};
 use crate::gpu::renderer::GpuRenderer;
+use crate::job::Job;
 use crate::output::numbers::significant;
-use crate::placement::Placement;
 use crate::reference::renderer::ReferenceRenderer;
 use crate::render::Renderer;
-use crate::scene::Scene;
 use crate::settings::{Rect, Settings};
+
+/// What renders.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum BackendKind {
+    /// In f32, through wgpu.
+    Gpu,
+    /// In f64, on the processor's cores.
+    Cpu,
+}
+
+impl BackendKind {
+    /// All of them.
+    pub const ALL: &'static [Self] = &[Self::Gpu, Self::Cpu];
+
+    /// The one of that name.
+    #[must_use]
+    pub fn of_name(name: &str) -> Option<Self> {
+        Self::ALL.iter().copied().find(|kind| kind.name() == name)
+    }
+
+    /// The name on the command line.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Gpu => "gpu",
+            Self::Cpu => "cpu",
+        }
+    }
+}
+
+/// Which device should render.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct BackendChoice<'a> {
+    /// `None`: a GPU, or the CPU reference where none can be used.
+    pub kind: Option<BackendKind>,
+    /// Index or part of the name of a GPU.
+    pub device: Option<&'a str>,
+    /// Threads of the CPU reference; 0 is one a core.
+    pub threads: usize,
+}
 
 /// A device that is ready: any number of renderers can be made on it.
 #[derive(Clone)]
@@ -25,37 +66,48 @@ pub enum Backend {
 }
 
 impl Backend {
-    /// `gpu` or `cpu`.
-    #[must_use]
-    pub fn name(&self) -> &'static str {
-        match self {
-            Self::Gpu(_) => "gpu",
-            Self::Cpu { .. } => "cpu",
+    /// Opens what was chosen. Without a choice, and without a usable GPU, that is the CPU reference, with a
+    /// warning.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if there is no device of that name, [`Error::Device`] if there is none at all.
+    pub fn open(choice: &BackendChoice<'_>, warnings: &mut Vec<String>) -> Result<Self> {
+        let cpu = Self::Cpu {
+            threads: choice.threads,
+        };
+        if choice.kind == Some(BackendKind::Cpu) {
+            return Ok(cpu);
+        }
+        match open_gpu(choice.device) {
+            Ok(gpu) => Ok(Self::Gpu(Box::new(gpu))),
+            Err(error) if choice.kind.is_some() || choice.device.is_some() => Err(error),
+            Err(_) => {
+                warnings.push(format!(
+                    "no usable GPU driver: rendering on the CPU reference, which is slower; {DRIVER_ADVICE}"
+                ));
+                Ok(cpu)
+            }
         }
     }
 
-    /// A renderer of the scene. On a GPU that links and compiles the kernel, which takes its time.
+    /// Which of the two it is.
+    #[must_use]
+    pub fn kind(&self) -> BackendKind {
+        match self {
+            Self::Gpu(_) => BackendKind::Gpu,
+            Self::Cpu { .. } => BackendKind::Cpu,
+        }
+    }
+
+    /// A renderer of the job. On a GPU that links and compiles the kernel, which takes its time.
     ///
     /// # Errors
     /// If the device fails or has not enough memory.
-    pub fn renderer(
-        &self,
-        scene: &Scene,
-        placement: &Placement,
-        effects: &Effects,
-        settings: &Settings,
-    ) -> Result<Box<dyn Renderer>> {
+    pub fn renderer(&self, job: &Job) -> Result<Box<dyn Renderer>> {
+        let settings = job.settings();
         let renderer: Box<dyn Renderer> = match self {
-            Self::Gpu(gpu) => Box::new(GpuRenderer::new(
-                Gpu::clone(gpu),
-                scene,
-                placement,
-                effects,
-                settings,
-            )?),
-            Self::Cpu { threads } => Box::new(ReferenceRenderer::new(
-                scene, placement, settings, *threads,
-            )?),
+            Self::Gpu(gpu) => Box::new(GpuRenderer::new(Gpu::clone(gpu), job)?),
+            Self::Cpu { threads } => Box::new(ReferenceRenderer::new(job, *threads)?),
         };
         // After the driver has taken its part.
         check_memory(&settings.crop, self.pixel_bytes(settings))?;
@@ -81,6 +133,19 @@ impl Backend {
         };
         image + pilot + aovs
     }
+}
+
+/// Opens a GPU: the one with this index or name, or the best.
+///
+/// # Errors
+/// [`Error::Usage`] if one was named and cannot be had, so that the user can name another;
+/// [`Error::Device`] if there is none.
+pub fn open_gpu(named: Option<&str>) -> Result<Gpu> {
+    let choice = named.map_or(DeviceChoice::Best, |text| text.parse().unwrap_or_default());
+    device::open(&choice).map_err(|error| match error {
+        Error::Device(text) if named.is_some() => Error::Usage(format!("--device: {text}")),
+        other => other,
+    })
 }
 
 /// What a pixel takes on any device.

@@ -8,13 +8,12 @@ use std::ops::Range;
 use serde::Serialize;
 
 use crate::backend::Backend;
-use crate::effects::Effects;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::film::{BLOCK, Film, Tally, WINDOW, window_end};
 use crate::forecast::squares;
-use crate::placement::Placement;
+use crate::job::{Job, prepare};
 use crate::render::Control;
-use crate::scene::{MAX_BOUNCES, Scene};
+use crate::scene::MAX_BOUNCES;
 use crate::settings::{Offset, Rect, Settings};
 
 /// What a setting did to the light of an image.
@@ -24,12 +23,26 @@ pub struct Entry {
     pub setting: &'static str,
     /// What it was set to.
     pub value: String,
-    /// The share of the light that it removed, a fraction; negative if it added some.
+    /// The share of the light that it removed, a fraction; negative if it added some; not a number (`null`
+    /// in JSON) where that is unknown.
     pub removed: f64,
     /// The standard error of `removed`; `null` in JSON where it is unknown.
     pub standard_error: f64,
     /// What it was compared with: more bounces, or exact ray origins.
     pub against: String,
+    /// Why `removed` is unknown: the scene cannot be rendered without the setting.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unknown: Option<String>,
+}
+
+impl Entry {
+    /// What to warn of; `None` where all is known.
+    #[must_use]
+    pub fn warning(&self) -> Option<String> {
+        let Self { setting, value, .. } = self;
+        let why = self.unknown.as_ref()?;
+        Some(format!("what {setting} {value} took is unknown: {why}"))
+    }
 }
 
 /// Paths of each side of a comparison, about.
@@ -75,38 +88,45 @@ fn suspects(settings: &Settings, tally: &Tally, paths: u64) -> Vec<Neutral> {
     all
 }
 
-/// Measures what each inexact setting of a finished render, which left `film`, removed; `None` if `go_on`
-/// said to stop.
+/// Measures what each inexact setting of a finished job, which left `film`, removed; `None` if `go_on`
+/// said to stop. A scene that only the setting lets be rendered has nothing to compare with, which its
+/// entry says.
 ///
 /// # Errors
 /// If the device fails.
 pub fn audit(
     backend: &Backend,
-    scene: &Scene,
-    settings: &Settings,
+    job: &Job,
     film: &Film,
     go_on: &dyn Fn() -> bool,
 ) -> Result<Option<Vec<Entry>>> {
+    let settings = job.settings();
     let suspects = suspects(settings, film.tally(), film.paths());
     let mut entries = Vec::new();
     if suspects.is_empty() {
         return Ok(Some(entries));
     }
     let plan = Plan::new(settings, film.paths());
-    let Some(with) = sample(backend, scene, settings, &plan, go_on)? else {
+    let plain = |settings: &Settings| prepare(job.scene(), &plan.settings(settings));
+    let Some(with) = sample(backend, &plain(settings)?, &plan, go_on)? else {
         return Ok(None);
     };
     for neutral in suspects {
-        let Some(without) = sample(backend, scene, &neutral.settings, &plan, go_on)? else {
-            return Ok(None);
+        let ((removed, standard_error), unknown) = match plain(&neutral.settings) {
+            Ok(neutral) => match sample(backend, &neutral, &plan, go_on)? {
+                Some(without) => (difference(&with, &without), None),
+                None => return Ok(None),
+            },
+            Err(Error::Scene(why)) => ((f64::NAN, f64::NAN), Some(why)),
+            Err(other) => return Err(other),
         };
-        let (removed, standard_error) = difference(&with, &without);
         entries.push(Entry {
             setting: neutral.setting,
             value: neutral.value,
             removed,
             standard_error,
             against: neutral.against,
+            unknown,
         });
     }
     Ok(Some(entries))
@@ -116,8 +136,7 @@ pub fn audit(
 /// alone: the squares, or its pixels.
 fn sample(
     backend: &Backend,
-    scene: &Scene,
-    settings: &Settings,
+    job: &Job,
     plan: &Plan,
     go_on: &dyn Fn() -> bool,
 ) -> Result<Option<Vec<f64>>> {
@@ -127,16 +146,7 @@ fn sample(
             (self.0)()
         }
     }
-    let settings = Settings {
-        adaptive: false,
-        classes: false,
-        features: false,
-        crop: plan.squares[0],
-        ..settings.clone()
-    };
-    let placement = Placement::with_offset(scene, settings.width, settings.height, settings.offset);
-    let effects = Effects::derive(scene, &placement, &settings);
-    let mut renderer = backend.renderer(scene, &placement, &effects, &settings)?;
+    let mut renderer = backend.renderer(job)?;
     let mut light = Vec::new();
     for square in &plan.squares {
         renderer.show(*square);
@@ -181,6 +191,17 @@ impl Plan {
         Self {
             squares,
             samples: start..start.saturating_add(spp).min(end),
+        }
+    }
+
+    /// The same, of what is looked at here alone.
+    fn settings(&self, settings: &Settings) -> Settings {
+        Settings {
+            adaptive: false,
+            classes: false,
+            features: false,
+            crop: self.squares[0],
+            ..settings.clone()
         }
     }
 }

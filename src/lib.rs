@@ -4,11 +4,12 @@
 //! decided:
 //!
 //! 1. [`cli`]: what was typed.
-//! 2. [`settings`]: what will be rendered, validated. [`sampler`]: which samples are placed together.
+//! 2. [`settings`]: how it will be rendered. [`sampler`]: which samples are placed together.
 //! 3. [`scene`]: the scene file, validated.
 //! 4. [`placement`]: where everything is, in f64, relative to where the picture is; what lies in what, which of
 //!    several dielectrics fills the space, what light sampling chooses from.
 //! 5. [`effects`]: what the scene asks for; nothing else goes into the kernel.
+//!    [`job`]: all of these, checked: renderers are made of jobs only. [`claims`]: what its estimator claims.
 //! 6. [`shader`]: the kernel, linked for these effects from `shaders/`.
 //! 7. [`gpu`] and [`reference`](mod@reference): two renderers, wgpu in f32 and the CPU in f64, that
 //!    trace the same paths. [`backend`]: one of them, opened.
@@ -28,6 +29,7 @@ pub mod allocation;
 pub mod aov;
 pub mod backend;
 pub mod check;
+pub mod claims;
 pub mod cli;
 pub mod compare;
 pub mod effects;
@@ -38,6 +40,7 @@ pub mod forecast;
 pub mod gpu;
 pub mod input;
 pub mod intervals;
+pub mod job;
 pub mod ledger;
 pub mod materials;
 pub mod output;

@@ -3,10 +3,11 @@
 use std::ops::Range;
 use std::time::{Duration, Instant};
 
-use crate::allocation::{Allocation, Tiles};
+use crate::allocation::{Allocation, PILOT_SAMPLES, Tiles};
 use crate::error::Result;
 use crate::estimate::Estimate;
 use crate::film::{BLOCK, Film, LEAST_SAMPLES, Window, next_look, window_end};
+use crate::job::Job;
 use crate::sampler::PILOT;
 use crate::settings::{Rect, Settings};
 
@@ -141,11 +142,23 @@ impl Control for Loop<'_> {
     }
 }
 
-/// Samples a pixel of a pilot: as many as its error needs to be known.
-pub const PILOT_SAMPLES: u64 = LEAST_SAMPLES;
+/// Renders until all samples are done or a stop rule of the job's settings holds. Where its estimator
+/// claims no error bars no error is estimated, for the stop rule neither.
+pub fn render(renderer: &mut dyn Renderer, job: &Job, watch: &mut dyn Watch) -> Outcome {
+    run(
+        renderer,
+        job.settings(),
+        job.claims().has_error_bars(),
+        watch,
+    )
+}
 
-/// Renders until all samples are done or a stop rule of `settings` holds.
-pub fn render(renderer: &mut dyn Renderer, settings: &Settings, watch: &mut dyn Watch) -> Outcome {
+fn run(
+    renderer: &mut dyn Renderer,
+    settings: &Settings,
+    error_bars: bool,
+    watch: &mut dyn Watch,
+) -> Outcome {
     let pixels = settings.crop.pixels() as u64;
     let spp = settings.samples.end - settings.samples.start;
     let status = Status {
@@ -157,6 +170,7 @@ pub fn render(renderer: &mut dyn Renderer, settings: &Settings, watch: &mut dyn 
     let mut run = Run {
         renderer,
         settings,
+        error_bars,
         control: Loop {
             watch,
             begin: Instant::now(),
@@ -190,7 +204,7 @@ pub fn render(renderer: &mut dyn Renderer, settings: &Settings, watch: &mut dyn 
         stopped_by
     };
     Outcome {
-        estimate: Estimate::of(&film),
+        estimate: run.estimate(&film),
         film,
         pilot,
         stopped_by,
@@ -203,11 +217,25 @@ pub fn render(renderer: &mut dyn Renderer, settings: &Settings, watch: &mut dyn 
 struct Run<'a> {
     renderer: &'a mut dyn Renderer,
     settings: &'a Settings,
+    /// Whether the spread of samples tells the error.
+    error_bars: bool,
     control: Loop<'a>,
     failure: Option<crate::error::Error>,
 }
 
 impl Run<'_> {
+    fn estimate(&self, film: &Film) -> Estimate {
+        let estimate = Estimate::of(film);
+        match self.error_bars {
+            true => estimate,
+            false => Estimate {
+                error: None,
+                error_at_most: None,
+                ..estimate
+            },
+        }
+    }
+
     /// Fills the film until the pixels of step 0 have the samples of `range`, or a stop rule holds:
     /// those of step s are always 2^s times as far.
     fn fill(&mut self, film: &mut Film, range: Range<u64>) -> StoppedBy {
@@ -223,7 +251,7 @@ impl Run<'_> {
                 }
             }
             start = end;
-            let estimate = Estimate::of(film);
+            let estimate = self.estimate(film);
             self.control.status.error = estimate.error;
             // At sample counts that nothing seen so far decides.
             if film.samples() >= look {
@@ -282,7 +310,8 @@ impl Run<'_> {
     }
 }
 
-/// Runs a render loop without display, signals or stop rules: for benchmarks and tests.
+/// Runs a render loop of any renderer without display or signals, and estimates the error as if it could be
+/// known: for benchmarks and tests.
 ///
 /// # Errors
 /// If the renderer fails.
@@ -294,7 +323,7 @@ pub fn render_quietly(renderer: &mut dyn Renderer, settings: &Settings) -> Resul
             false
         }
     }
-    let mut outcome = render(renderer, settings, &mut Quiet);
+    let mut outcome = run(renderer, settings, true, &mut Quiet);
     match outcome.failure.take() {
         Some(error) => Err(error),
         None => Ok(outcome),

@@ -15,6 +15,9 @@ pub enum Sampler {
 }
 
 impl Sampler {
+    /// All of them.
+    pub const ALL: &'static [Self] = &[Self::Sobol, Self::Independent];
+
     /// The name on the command line.
     #[must_use]
     pub fn name(self) -> &'static str {
@@ -56,7 +59,7 @@ mod tests {
 
     #[test]
     fn batches_change_at_the_levels_only() {
-        for sampler in [Sampler::Independent, Sampler::Sobol] {
+        for sampler in Sampler::ALL {
             for index in 1..2000 {
                 let changes = sampler.batch(index) != sampler.batch(index - 1);
                 assert_eq!(changes, sampler.levels()[1..].contains(&index), "{index}");

@@ -1,5 +1,6 @@
-//! What will be rendered: options after validation, with every default decided.
+//! How a scene will be rendered, with every default decided; `job` checks it.
 
+use std::ops::{Range, RangeInclusive};
 use std::time::Duration;
 
 use crate::sampler::Sampler;
@@ -13,6 +14,10 @@ pub const MAXIMUM_SPP: u64 = 1 << 20;
 pub const DEFAULT_MAX_BOUNCES: u32 = 64;
 /// The lecture's probability of termination.
 pub const DEFAULT_TERMINATION: f64 = 0.2;
+/// What the lecture's probability of termination can be.
+pub const TERMINATIONS: Range<f64> = 0.0..1.0;
+/// What the distance of an [`Offset`] can be, in scene units.
+const DISTANCES: RangeInclusive<f64> = 0.0..=1.0e20;
 
 /// Everything that decides an image besides the scene.
 #[derive(Clone, Debug, PartialEq)]
@@ -24,7 +29,7 @@ pub struct Settings {
     /// The part of the image that is rendered.
     pub crop: Rect,
     /// Sample indices to render, first and one past the last.
-    pub samples: std::ops::Range<u64>,
+    pub samples: Range<u64>,
     /// Seed of the sample stream.
     pub seed: u64,
     /// The largest number of scattering events of a path.
@@ -35,7 +40,8 @@ pub struct Settings {
     pub light_sampling: LightSampling,
     /// How the random numbers of samples are placed.
     pub sampler: Sampler,
-    /// Whether paths end by Russian roulette on their throughput (`bsdf` only).
+    /// Whether paths end by Russian roulette on their throughput. The lecture's estimator has its own, and
+    /// does not ask.
     pub roulette: bool,
     /// The form of the geometry in the kernel.
     pub geometry: GeometryChoice,
@@ -142,6 +148,31 @@ pub enum Integrator {
 }
 
 impl Integrator {
+    /// All of them; the lecture's as it is where nobody says.
+    pub const ALL: &'static [Self] = &[
+        Self::Path,
+        Self::Bsdf,
+        Self::Nee,
+        Self::Lecture {
+            termination: DEFAULT_TERMINATION,
+        },
+    ];
+
+    /// The same; if it is the lecture's, then with this probability of termination.
+    #[must_use]
+    pub fn with_termination(self, termination: f64) -> Self {
+        match self {
+            Self::Lecture { .. } => Self::Lecture { termination },
+            other => other,
+        }
+    }
+
+    /// Whether it is the lecture's.
+    #[must_use]
+    pub fn is_lecture(self) -> bool {
+        matches!(self, Self::Lecture { .. })
+    }
+
     /// The name on the command line.
     #[must_use]
     pub fn name(self) -> &'static str {
@@ -166,6 +197,9 @@ pub enum LightSampling {
 }
 
 impl LightSampling {
+    /// All of them.
+    pub const ALL: &'static [Self] = &[Self::Projected, Self::Cone];
+
     /// The name on the command line.
     #[must_use]
     pub fn name(self) -> &'static str {
@@ -185,6 +219,21 @@ pub enum GeometryChoice {
     Baked,
     /// A loop over storage buffers.
     List,
+}
+
+impl GeometryChoice {
+    /// All of them.
+    pub const ALL: &'static [Self] = &[Self::Auto, Self::Baked, Self::List];
+
+    /// The name on the command line.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Auto => "auto",
+            Self::Baked => "baked",
+            Self::List => "list",
+        }
+    }
 }
 
 /// How a path leaves a surface without hitting it again.
@@ -220,6 +269,13 @@ impl Offset {
         }
     }
 
+    /// Whether its distance, if it has one, is in range.
+    #[must_use]
+    pub fn is_valid(self) -> bool {
+        let mut distances = self.distances().into_iter().flatten();
+        distances.all(|x| DISTANCES.contains(&x))
+    }
+
     /// The same in units of which `scale` make a scene unit.
     #[must_use]
     pub fn scaled(self, scale: f64) -> Self {
@@ -253,7 +309,7 @@ impl std::str::FromStr for Offset {
             ("exact", _) if mode == text => Ok(Self::Exact),
             ("none", _) if mode == text => Ok(Self::None),
             ("ulp", _) if mode == text => Ok(Self::Ulp),
-            ("back" | "out", Ok(x)) if (0.0..=1.0e20).contains(&x) => Ok(if mode == "back" {
+            ("back" | "out", Ok(x)) if DISTANCES.contains(&x) => Ok(if mode == "back" {
                 Self::Back(x)
             } else {
                 Self::Out(x)

@@ -681,6 +681,41 @@ fn a_lens_across_one_of_several_media_is_refused() {
         &run.stderr,
         &["the lens lies on both sides of sphere 1", "aperture_radius"],
     );
+    // By the sign of a nudge it can be rendered, but what the nudge does cannot be known.
+    let run = folder.run("across.toml --spp 4 --offset out:1e-2 -o r.npy --stats r.json");
+    assert_eq!(run.code, Some(0), "{run:?}");
+    holds(&run.stdout, &["what offset out:0.01 took is unknown"]);
+    holds(
+        &run.stderr,
+        &["warning: what offset out:0.01 took is unknown: the lens lies on both sides of sphere 1"],
+    );
+    let stats = folder.json("r.json");
+    let entries = stats["ledger"].as_array().expect("a list");
+    let entry = entries.iter().find(|e| e["setting"] == "offset");
+    let entry = entry.expect("an entry");
+    assert_eq!(
+        (&entry["removed"], &entry["standard_error"]),
+        (&Value::Null, &Value::Null)
+    );
+    holds(
+        entry["unknown"].as_str().expect("a reason"),
+        &["the lens lies on both sides"],
+    );
+    let warnings = stats["warnings"].to_string();
+    holds(
+        &warnings,
+        &["what offset out:0.01 took is unknown: the lens"],
+    );
+    // A study against an exact reference of its own is refused before anything is rendered.
+    let text = folder.refused(&[
+        "converge",
+        "across.toml",
+        "--offsets",
+        "out:1e-2",
+        "--spp",
+        "4",
+    ]);
+    holds(&text, &["the lens lies on both sides of sphere 1"]);
     // One alone is no question.
     folder.write("alone.toml", glasses("[0, 0, 0.99]", 0.3, &spheres[..1]));
     let run = folder.run("alone.toml --spp 4");

@@ -16,11 +16,9 @@ use std::time::{Duration, Instant};
 
 use cli_support::{Background, Folder, Run, bits, holds};
 use gpu_trace::check::Random;
-use gpu_trace::effects::Effects;
 use gpu_trace::error::Error;
 use gpu_trace::gpu::renderer::GpuRenderer;
 use gpu_trace::output::{Contents, Format, Metadata, Picture, atomic, npy, read_npy};
-use gpu_trace::placement::Placement;
 use gpu_trace::scene::load::{load_file, load_str};
 use gpu_trace::settings::GeometryChoice;
 use serde_json::json;
@@ -157,12 +155,11 @@ fn a_scene_beyond_the_devices_limits_is_an_error() {
     let scene = common::scene_file("scenes/glass.toml");
     let mut settings = common::settings(&scene, 64, 64, 1);
     settings.geometry = GeometryChoice::List;
-    let placement = Placement::new(&scene, 64, 64);
-    let effects = Effects::derive(&scene, &placement, &settings);
+    let job = common::job(&scene, &settings);
     let with_at_most = |bytes: u64| {
         let mut gpu = common::gpu();
         gpu.limits.max_storage_buffer_binding_size = bytes;
-        GpuRenderer::new(gpu, &scene, &placement, &effects, &settings)
+        GpuRenderer::new(gpu, &job)
     };
     for (bytes, part) in [(64, "need"), (4096, "the partial sums need")] {
         match with_at_most(bytes) {

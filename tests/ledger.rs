@@ -2,16 +2,17 @@
 
 mod common;
 
-use common::{gpu, render_gpu, scene, scene_file, settings};
+use common::{gpu, job, render_gpu, scene, scene_file, settings};
 use gpu_trace::backend::Backend;
 use gpu_trace::estimate::Estimate;
+use gpu_trace::job::prepare;
 use gpu_trace::ledger::{Entry, audit};
 use gpu_trace::scene::Scene;
 use gpu_trace::settings::{Integrator, Offset, Settings};
 
 fn entries(backend: &Backend, scene: &Scene, settings: &Settings) -> Vec<Entry> {
     let film = render_gpu(scene, settings);
-    let entries = audit(backend, scene, settings, &film, &|| true);
+    let entries = audit(backend, &job(scene, settings), &film, &|| true);
     entries
         .unwrap_or_else(|e| panic!("{e}"))
         .expect("nothing stops it")
@@ -115,6 +116,61 @@ fn what_takes_nothing_is_not_in_it() {
         ..settings(&scene, 32, 32, 16)
     };
     let film = render_gpu(&scene, &settings);
-    let stopped = audit(&backend, &scene, &settings, &film, &|| false);
+    let stopped = audit(&backend, &job(&scene, &settings), &film, &|| false);
     assert_eq!(stopped.unwrap_or_else(|e| panic!("{e}")), None);
+}
+
+/// A lens across one of two glass balls; `apart` moves the other off it.
+fn across(apart: f64) -> Scene {
+    scene(&format!(
+        "[camera]\nposition = [0, 0, 0.99]\nlook_at = [7, 0, -5]\nfov = 5.0\n\
+         aperture_radius = 0.3\nfocus_distance = 10.0\n[image]\nwidth = 16\nheight = 16\n\
+         [environment]\nradiance = [1, 1, 1]\n[material.glass]\ntype = \"dielectric\"\nior = 1.5\n\
+         [[sphere]]\ncenter = [0, 0, 0]\nradius = 1.0\nmaterial = \"glass\"\n\
+         [[sphere]]\ncenter = [{}, 0, 1]\nradius = 0.4\nmaterial = \"glass\"\n",
+        0.75 + apart
+    ))
+}
+
+#[test]
+fn what_only_an_offset_lets_be_rendered_has_no_figure() {
+    // By sign the lens may be on both sides; exactly, its points would be in different media.
+    let with = |scene: &Scene, offset| Settings {
+        offset,
+        ..settings(scene, 16, 16, 16)
+    };
+    let offset = Offset::Out(1.0e-2);
+    for backend in [Backend::Gpu(Box::new(gpu())), Backend::Cpu { threads: 0 }] {
+        let scene = across(0.0);
+        let refused = prepare(&scene, &with(&scene, Offset::Exact)).map(|_| ());
+        let found = entries(&backend, &scene, &with(&scene, offset));
+        let entry = |name| found.iter().find(|e| e.setting == name);
+        let entry = entry("offset").expect("an entry");
+        assert!(entry.removed.is_nan() && entry.standard_error.is_nan());
+        let why = refused.expect_err("it is refused").to_string();
+        assert_eq!(entry.unknown.as_ref(), Some(&why));
+        // What does not need the exact scene is known all the same.
+        let settings = Settings {
+            max_bounces: 1,
+            ..with(&scene, offset)
+        };
+        let found = entries(&backend, &scene, &settings);
+        let [bounces, nudge] = found.as_slice() else {
+            panic!("{found:?}");
+        };
+        assert!(
+            bounces.removed > 0.0 && bounces.unknown.is_none(),
+            "{bounces:?}"
+        );
+        assert!(nudge.unknown.is_some(), "{nudge:?}");
+        // Companion: the other ball off the first, there is a figure.
+        let scene = across(2.0);
+        let found = entries(&backend, &scene, &with(&scene, offset));
+        let entry = found.iter().find(|e| e.setting == "offset");
+        let entry = entry.expect("an entry");
+        assert!(
+            entry.removed.is_finite() && entry.unknown.is_none(),
+            "{entry:?}"
+        );
+    }
 }

@@ -9,7 +9,7 @@ use std::ops::Range;
 use std::time::Duration;
 
 use common::{
-    gpu_renderer, means, render_cpu, render_gpu, scene, scene_file, scene_files, settings,
+    gpu_renderer, job, means, render_cpu, render_gpu, scene, scene_file, scene_files, settings,
 };
 use gpu_trace::allocation::Tiles;
 use gpu_trace::effects::Effects;
@@ -153,7 +153,7 @@ fn large_images_stop_between_their_parts() {
             paths: 0,
             late: 0,
         };
-        let outcome = render(&mut renderer(), &settings, &mut watch);
+        let outcome = render(&mut renderer(), &job(&scene, &settings), &mut watch);
         assert_eq!(outcome.stopped_by, StoppedBy::Interrupt);
         let done = outcome.film.samples();
         let first = samples < 16.0;

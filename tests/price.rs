@@ -6,7 +6,7 @@ mod common;
 use std::time::Duration;
 
 use cli_support::{BLACK, Folder, holds};
-use common::{gpu_renderer, scene_file, settings};
+use common::{gpu_renderer, job, scene_file, settings};
 use gpu_trace::forecast::{self, Pilot};
 use gpu_trace::render::render_quietly;
 use gpu_trace::sampler::Sampler;
@@ -17,7 +17,8 @@ use serde_json::Value;
 fn pilot(name: &str, settings: &Settings) -> Pilot {
     let scene = scene_file(format!("scenes/{name}.toml"));
     let mut renderer = gpu_renderer(&scene, settings);
-    forecast::run(&mut renderer, settings, Duration::ZERO, &|| true)
+    let job = job(&scene, settings);
+    forecast::run(&mut renderer, &job, Duration::ZERO, &|| true)
         .unwrap_or_else(|e| panic!("{name}: {e}"))
         .expect("nothing stops it")
 }

@@ -11,10 +11,9 @@
 
 mod common;
 
-use common::{render_cpu, render_gpu, scene, settings};
-use gpu_trace::estimate::{VarianceClass, variance_class};
+use common::{job, render_cpu, render_gpu, scene, settings};
+use gpu_trace::estimate::VarianceClass;
 use gpu_trace::film::Film;
-use gpu_trace::placement::Placement;
 use gpu_trace::sampler::Sampler;
 use gpu_trace::scene::Scene;
 use gpu_trace::settings::{Integrator, Settings};
@@ -174,8 +173,8 @@ fn no_render_shows_an_infinite_variance() {
 }
 
 fn class(scene: &Scene, settings: &Settings) -> VarianceClass {
-    let placement = Placement::new(scene, settings.width, settings.height);
-    let report = variance_class(scene, &placement, settings);
+    let job = job(scene, settings);
+    let report = job.variance();
     let quiet = report.class == VarianceClass::Finite;
     assert_eq!(report.warning.is_none(), quiet, "{report:?}");
     report.class

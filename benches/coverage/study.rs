@@ -1,12 +1,11 @@
 //! How often intervals hold the truth: renders of many seeds against what all others agree on.
 
-use gpu_trace::effects::Effects;
 use gpu_trace::estimate::Estimate;
 use gpu_trace::film::{Film, next_look, window_end};
 use gpu_trace::gpu::device::Gpu;
 use gpu_trace::gpu::renderer::GpuRenderer;
 use gpu_trace::intervals::half_widths;
-use gpu_trace::placement::Placement;
+use gpu_trace::job::prepare;
 use gpu_trace::render::{Control, Renderer as _};
 use gpu_trace::scene::Scene;
 use gpu_trace::settings::Settings;
@@ -64,10 +63,8 @@ pub(crate) fn runs(
     samples: &[u64],
     stop: u64,
 ) -> Runs {
-    let placement = Placement::new(scene, settings.width, settings.height);
-    let effects = Effects::derive(scene, &placement, settings);
-    let mut renderer = GpuRenderer::new(gpu.clone(), scene, &placement, &effects, settings)
-        .unwrap_or_else(|e| panic!("{e}"));
+    let job = prepare(scene, settings).unwrap_or_else(|e| panic!("{e}"));
+    let mut renderer = GpuRenderer::new(gpu.clone(), &job).unwrap_or_else(|e| panic!("{e}"));
     let end = *samples.last().expect("a number of samples");
     let mut said: Vec<Vec<Said>> = (0..=samples.len()).map(|_| Vec::new()).collect();
     let mut limit = f64::NAN;

@@ -15,10 +15,9 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use flat::FlatScene;
-use gpu_trace::effects::Effects;
 use gpu_trace::gpu::device::{self, DeviceChoice};
 use gpu_trace::gpu::renderer::GpuRenderer;
-use gpu_trace::placement::Placement;
+use gpu_trace::job::prepare;
 use gpu_trace::reference::renderer::ReferenceRenderer;
 use gpu_trace::render::{Renderer, render_quietly};
 use gpu_trace::scene::{Scene, builtin, load};
@@ -87,8 +86,7 @@ impl Batches<'_> {
     fn all(&self) {
         let scene = load(self.scene);
         let mut settings = Settings::for_scene(&scene);
-        let placement = Placement::new(&scene, scene.width, scene.height);
-        let effects = Effects::derive(&scene, &placement, &settings);
+        let job = prepare(&scene, &settings).unwrap_or_else(|e| panic!("{e}"));
         let bounces = settings.max_bounces;
         let flat = FlatScene::of(&scene);
         let gpu = device::open(&DeviceChoice::Best).unwrap_or_else(|e| panic!("{e}"));
@@ -102,10 +100,8 @@ impl Batches<'_> {
         std::fs::write(&path, description.to_string())
             .unwrap_or_else(|e| panic!("{}: {e}", path.display()));
 
-        let mut kernel = GpuRenderer::new(gpu, &scene, &placement, &effects, &settings)
-            .unwrap_or_else(|e| panic!("{e}"));
-        let mut reference = ReferenceRenderer::new(&scene, &placement, &settings, 0)
-            .unwrap_or_else(|e| panic!("{e}"));
+        let mut kernel = GpuRenderer::new(gpu, &job).unwrap_or_else(|e| panic!("{e}"));
+        let mut reference = ReferenceRenderer::new(&job, 0).unwrap_or_else(|e| panic!("{e}"));
         let both: [(&str, &mut dyn Renderer); 2] =
             [("gpu-trace", &mut kernel), ("truth", &mut reference)];
         for (name, renderer) in both {

@@ -10,6 +10,7 @@ use crate::gpu::bsdf_probe::BsdfProbe;
 use crate::gpu::device::Gpu;
 use crate::gpu::probe::Probe;
 use crate::gpu::renderer::GpuRenderer;
+use crate::job::prepare;
 use crate::materials::MaterialKind;
 use crate::placement::Placement;
 use crate::reference::renderer::ReferenceRenderer;
@@ -105,11 +106,8 @@ impl Context {
     /// # Errors
     /// If the device fails.
     pub fn render(&self, scene: &Scene, settings: &Settings) -> Result<Film> {
-        let placement =
-            Placement::with_offset(scene, settings.width, settings.height, settings.offset);
-        let effects = Effects::derive(scene, &placement, settings);
-        let gpu = self.gpu.clone();
-        let mut renderer = GpuRenderer::new(gpu, scene, &placement, &effects, settings)?;
+        let job = prepare(scene, settings)?;
+        let mut renderer = GpuRenderer::new(self.gpu.clone(), &job)?;
         Ok(render_quietly(&mut renderer, settings)?.film)
     }
 
@@ -122,8 +120,7 @@ impl Context {
             offset: Offset::Exact,
             ..settings.clone()
         };
-        let placement = Placement::new(scene, settings.width, settings.height);
-        let mut renderer = ReferenceRenderer::new(scene, &placement, &settings, 0)?;
+        let mut renderer = ReferenceRenderer::new(&prepare(scene, &settings)?, 0)?;
         Ok(render_quietly(&mut renderer, &settings)?.film)
     }
 }

@@ -4,12 +4,11 @@
 use super::context::{Context, SceneText, image_bits, means, share_off};
 use super::inputs::Random;
 use super::{Case, Measure, Run};
-use crate::effects::Effects;
 use crate::error::{Error, Result};
 use crate::film::Film;
 use crate::gpu::device::Gpu;
 use crate::gpu::renderer::{DispatchLimits, GpuRenderer};
-use crate::placement::Placement;
+use crate::job::prepare;
 use crate::reference::core::random::{random4, sample_key};
 use crate::render::render_quietly;
 use crate::scene::Scene;
@@ -442,9 +441,7 @@ fn refusals(context: &Context, scene: &Scene, measure: &mut Measure) -> Result<(
 }
 
 fn renderer(gpu: Gpu, scene: &Scene, settings: &Settings) -> Result<GpuRenderer> {
-    let placement = Placement::with_offset(scene, settings.width, settings.height, settings.offset);
-    let effects = Effects::derive(scene, &placement, settings);
-    GpuRenderer::new(gpu, scene, &placement, &effects, settings)
+    GpuRenderer::new(gpu, &prepare(scene, settings)?)
 }
 
 fn dispatches(context: &Context) -> Result<Measure> {

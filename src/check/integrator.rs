@@ -4,9 +4,9 @@ use super::context::{Context, SceneText, means};
 use super::film::must;
 use super::{Case, Measure, Run};
 use crate::error::Result;
-use crate::estimate::{VarianceClass, variance_class};
+use crate::estimate::VarianceClass;
 use crate::film::{BLOCK, Film};
-use crate::placement::Placement;
+use crate::job::prepare;
 use crate::sampler::Sampler;
 use crate::scene::Scene;
 use crate::settings::{Integrator, Settings};
@@ -431,8 +431,7 @@ fn classes(context: &Context, measure: &mut Measure) -> Result<()> {
             integrator: Integrator::Lecture { termination: 0.2 },
             ..context.settings(&scene, 1, 1)
         };
-        let placement = Placement::with_offset(&scene, 1, 1, settings.offset);
-        let class = variance_class(&scene, &placement, &settings).class;
+        let class = prepare(&scene, &settings)?.variance().class;
         must(measure, class == wanted, || {
             format!("rho {rho}: {class:?} instead of {wanted:?}")
         });

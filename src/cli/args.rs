@@ -4,15 +4,14 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 
-use super::device::Choice;
+use super::choices::{self, Wanted};
 use super::fault::Fault;
 use super::values;
-use crate::effects::BAKED_MOST;
+use crate::backend::{BackendChoice, BackendKind};
 use crate::error::{Error, Result};
 use crate::output::{Aov, ProgressMode};
-use crate::render::PILOT_SAMPLES;
 use crate::sampler::Sampler;
 use crate::scene::{MAX_BOUNCES, Scene};
 use crate::settings::{
@@ -87,7 +86,7 @@ pub struct RenderArgs {
         help_heading = "Output",
         help = "Progress on stderr: auto (a bar on a terminal), plain, json, none"
     )]
-    pub progress: ProgressArg,
+    pub progress: ProgressMode,
     #[arg(
         short,
         long,
@@ -168,7 +167,7 @@ pub struct RenderArgs {
         help_heading = "Light transport",
         help = "Estimator: path (BSDF and light sampling), bsdf, nee (light sampling alone), or lecture (uniform hemisphere, constant p) [default: path]"
     )]
-    pub integrator: IntegratorArg,
+    pub integrator: Integrator,
     #[arg(
         long,
         value_name = "NAME",
@@ -177,7 +176,7 @@ pub struct RenderArgs {
         help_heading = "Light transport",
         help = "Directions to lights: projected (by projected solid angle), or for comparison cone (by solid angle, lights by power) [default: projected]"
     )]
-    pub light_sampling: Option<LightSamplingArg>,
+    pub light_sampling: Option<LightSampling>,
     #[arg(
         long,
         value_name = "NAME",
@@ -188,7 +187,7 @@ pub struct RenderArgs {
         help_heading = "Light transport",
         help = "Sample placement: sobol (scrambled Sobol' sequences) or independent [default: sobol]"
     )]
-    pub sampler: SamplerArg,
+    pub sampler: Sampler,
     #[arg(
         long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=i64::from(MAX_BOUNCES)),
         allow_negative_numbers = true, help_heading = "Light transport",
@@ -198,12 +197,12 @@ pub struct RenderArgs {
     #[arg(
         long,
         value_name = "on|off",
-        value_enum,
+        value_parser = choices::switch(),
         help_heading = "Light transport",
         hide_possible_values = true,
         help = "End weak paths early by Russian roulette, without bias [default: on]"
     )]
-    pub roulette: Option<OnOff>,
+    pub roulette: Option<bool>,
     #[arg(
         long, value_name = "P", value_parser = values::termination, allow_negative_numbers = true,
         help_heading = "Light transport",
@@ -224,14 +223,14 @@ pub struct RenderArgs {
     #[arg(
         long,
         value_name = "NAME",
-        value_enum,
+        value_parser = choices::backend(),
         default_value = "auto",
         hide_possible_values = true,
         hide_default_value = true,
         help_heading = "Device",
         help = "What renders: auto, gpu, or cpu (the f64 reference) [default: auto]"
     )]
-    pub backend: BackendArg,
+    pub backend: Wanted,
     #[arg(
         long,
         value_name = "INDEX|NAME",
@@ -249,7 +248,7 @@ pub struct RenderArgs {
         help_heading = "Device",
         help = "Spheres in the kernel: auto, baked (constants) or list (a buffer) [default: auto]"
     )]
-    pub geometry: GeometryArg,
+    pub geometry: GeometryChoice,
     #[arg(
         long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024),
         allow_negative_numbers = true, help_heading = "Device", help = "Threads of the CPU reference [default: one a core]"
@@ -262,33 +261,6 @@ pub struct RenderArgs {
         help = "Let something fail, for tests"
     )]
     pub inject_fault: Option<Fault>,
-}
-
-macro_rules! choices {
-    ($($(#[$doc:meta])* $name:ident { $($variant:ident),* $(,)? })*) => {
-        $(
-            $(#[$doc])*
-            #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-            pub enum $name { $($variant),* }
-        )*
-    };
-}
-
-choices! {
-    /// `--progress`
-    ProgressArg { Auto, Plain, Json, None }
-    /// `--integrator`
-    IntegratorArg { Path, Bsdf, Nee, Lecture }
-    /// `--light-sampling`
-    LightSamplingArg { Projected, Cone }
-    /// `--sampler`
-    SamplerArg { Sobol, Independent }
-    /// `--roulette`
-    OnOff { On, Off }
-    /// `--backend`
-    BackendArg { Auto, Gpu, Cpu }
-    /// `--geometry`
-    GeometryArg { Auto, Baked, List }
 }
 
 impl RenderArgs {
@@ -312,49 +284,31 @@ impl RenderArgs {
     }
 
     /// What should render.
-    pub(super) fn device_choice(&self) -> Choice<'_> {
-        Choice {
-            backend: self.backend,
+    pub(super) fn backend_choice(&self) -> BackendChoice<'_> {
+        BackendChoice {
+            kind: self.backend.kind(),
             device: self.device.as_deref(),
-            threads: self.threads,
-        }
-    }
-
-    /// How progress is shown.
-    #[must_use]
-    pub fn progress_mode(&self) -> ProgressMode {
-        match self.progress {
-            ProgressArg::Auto => ProgressMode::Auto,
-            ProgressArg::Plain => ProgressMode::Plain,
-            ProgressArg::Json => ProgressMode::Json,
-            ProgressArg::None => ProgressMode::None,
+            threads: self.threads.map_or(0, usize::from),
         }
     }
 
     /// The settings for `scene`: the command line wins over the scene, the scene over the defaults.
     ///
     /// # Errors
-    /// [`Error::Usage`] where options contradict each other or the scene.
+    /// [`Error::Usage`] for options without meaning beside the others. Whether the settings can be
+    /// rendered is for [`prepare`](crate::job::prepare) to say.
     pub fn settings(&self, scene: &Scene) -> Result<Settings> {
+        self.check_company()?;
         let mut settings = Settings::for_scene(scene);
         if let Some((width, height)) = self.size {
             (settings.width, settings.height) = (width, height);
         }
-        let whole = Rect {
+        settings.crop = self.crop.unwrap_or(Rect {
             x: 0,
             y: 0,
             width: settings.width,
             height: settings.height,
-        };
-        settings.crop = self.crop.unwrap_or(whole);
-        let crop = &settings.crop;
-        let fits = |at: u32, size: u32, all: u32| u64::from(at) + u64::from(size) <= u64::from(all);
-        if !fits(crop.x, crop.width, whole.width) || !fits(crop.y, crop.height, whole.height) {
-            return Err(Error::Usage(format!(
-                "--crop {},{},{}x{} reaches beyond the image of {}x{} pixels",
-                crop.x, crop.y, crop.width, crop.height, whole.width, whole.height
-            )));
-        }
+        });
         if let Some(spp) = self.spp {
             settings.samples = 0..spp;
         } else if self.error.is_some() || self.time.is_some() {
@@ -364,76 +318,50 @@ impl RenderArgs {
         if let Some(range) = &self.sample_range {
             settings.samples = range.clone();
         }
-        settings.seed = self.seed;
-        settings.max_bounces = self.max_bounces.unwrap_or(settings.max_bounces);
-        let lecture = self.integrator == IntegratorArg::Lecture;
-        if lecture {
-            let termination = self.termination.unwrap_or(DEFAULT_TERMINATION);
-            settings.integrator = Integrator::Lecture { termination };
-        } else if self.termination.is_some() {
+        let termination = self.termination.unwrap_or(DEFAULT_TERMINATION);
+        Ok(Settings {
+            seed: self.seed,
+            max_bounces: self.max_bounces.unwrap_or(settings.max_bounces),
+            integrator: self.integrator.with_termination(termination),
+            light_sampling: self.light_sampling.unwrap_or_default(),
+            roulette: !self.integrator.is_lecture() && self.roulette != Some(false),
+            sampler: self.sampler,
+            geometry: self.geometry,
+            offset: self.offset,
+            adaptive: self.adaptive,
+            classes: self.aov.iter().any(|aov| aov.class().is_some()),
+            features: self.aov.iter().any(|aov| aov.is_feature()),
+            error: self.error,
+            time: self.time,
+            ..settings
+        })
+    }
+
+    /// Refuses options that say nothing beside the others.
+    fn check_company(&self) -> Result<()> {
+        let lecture = self.integrator.is_lecture();
+        if self.termination.is_some() && !lecture {
             return Err(Error::Usage(
                 "--termination is the lecture's: add --integrator lecture".into(),
             ));
         }
-        match self.integrator {
-            IntegratorArg::Path => settings.integrator = Integrator::Path,
-            IntegratorArg::Bsdf => settings.integrator = Integrator::Bsdf,
-            IntegratorArg::Nee => settings.integrator = Integrator::Nee,
-            IntegratorArg::Lecture => {}
+        if self.light_sampling.is_some() && (lecture || self.integrator == Integrator::Bsdf) {
+            return Err(Error::Usage(format!(
+                "--light-sampling says how path and nee sample lights: --integrator {} does not",
+                self.integrator.name()
+            )));
         }
-        if let Some(how) = self.light_sampling {
-            if lecture || settings.integrator == Integrator::Bsdf {
-                return Err(Error::Usage(format!(
-                    "--light-sampling says how path and nee sample lights: --integrator {} does not",
-                    settings.integrator.name()
-                )));
-            }
-            settings.light_sampling = match how {
-                LightSamplingArg::Projected => LightSampling::Projected,
-                LightSamplingArg::Cone => LightSampling::Cone,
-            };
-        }
-        if lecture && self.roulette.is_some() {
+        if self.roulette.is_some() && lecture {
             return Err(Error::Usage(
                 "--integrator lecture has its own roulette: --termination 0 turns it off".into(),
             ));
         }
-        settings.roulette = !lecture && self.roulette != Some(OnOff::Off);
-        settings.sampler = match self.sampler {
-            SamplerArg::Independent => Sampler::Independent,
-            SamplerArg::Sobol => Sampler::Sobol,
-        };
-        settings.geometry = match self.geometry {
-            GeometryArg::Auto => GeometryChoice::Auto,
-            GeometryArg::Baked => GeometryChoice::Baked,
-            GeometryArg::List => GeometryChoice::List,
-        };
-        if settings.geometry == GeometryChoice::Baked && scene.spheres.len() > BAKED_MOST {
-            return Err(Error::Usage(format!(
-                "--geometry baked takes up to {BAKED_MOST} spheres, the scene has {}: leave it to \
-                 auto, or use list",
-                scene.spheres.len()
-            )));
-        }
-        settings.offset = self.offset;
-        settings.adaptive = self.adaptive;
-        settings.classes = self.aov.iter().any(|aov| aov.class().is_some());
-        settings.features = self.aov.iter().any(|aov| aov.is_feature());
-        let least = 2 * PILOT_SAMPLES;
-        if self.adaptive && settings.samples.end < least {
-            return Err(Error::Usage(format!(
-                "--adaptive needs at least {least} samples a pixel: {PILOT_SAMPLES} of them decide where \
-                 the others go, and are in no pixel"
-            )));
-        }
-        settings.error = self.error;
-        settings.time = self.time;
-        if self.backend == BackendArg::Cpu && self.device.is_some() {
+        if self.backend == Wanted::Only(BackendKind::Cpu) && self.device.is_some() {
             return Err(Error::Usage(
                 "--device chooses a GPU, --backend cpu uses none".into(),
             ));
         }
-        Ok(settings)
+        Ok(())
     }
 }
 

@@ -6,23 +6,17 @@ use serde_json::json;
 
 use super::args::CheckArgs;
 use super::print;
+use crate::backend::open_gpu;
 use crate::check::{
     Case, CaseReport, Context, DriverReport, Options, Verdict, cases, probe_driver,
 };
 use crate::error::{Error, Result};
-use crate::gpu::device::{AdapterSummary, DeviceChoice, open};
+use crate::gpu::device::AdapterSummary;
 
 /// Runs `check`.
 pub(super) fn run(args: &CheckArgs) -> Result<()> {
     let chosen = choose(&args.case)?;
-    let choice = args
-        .device
-        .as_deref()
-        .map_or(DeviceChoice::Best, |text| text.parse().unwrap_or_default());
-    let gpu = open(&choice).map_err(|error| match error {
-        Error::Device(text) if args.device.is_some() => Error::Usage(format!("--device: {text}")),
-        other => other,
-    })?;
+    let gpu = open_gpu(args.device.as_deref())?;
     let options = Options {
         offset: args.offset,
         quick: args.quick,

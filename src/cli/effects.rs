@@ -3,9 +3,10 @@
 use std::fmt::Write as _;
 
 use super::args::RenderArgs;
-use super::{derive, print};
+use super::print;
 use crate::effects::Effects;
 use crate::error::{Error, Result};
+use crate::job::prepare;
 use crate::output::{atomic, check_all};
 use crate::scene::builtin;
 use crate::shader::{Stage, link};
@@ -13,9 +14,9 @@ use crate::shader::{Stage, link};
 /// Runs `effects`.
 pub(super) fn run(args: &RenderArgs, json: bool) -> Result<()> {
     let loaded = builtin::resolve(args.scene.as_deref())?;
-    let settings = args.settings(&loaded.scene)?;
-    let (placement, effects) = derive(&loaded.scene, &settings)?;
-    let kernel = link(Stage::Path, &loaded.scene, &placement, &effects)?;
+    let job = prepare(&loaded.scene, &args.settings(&loaded.scene)?)?;
+    let effects = job.effects();
+    let kernel = link(Stage::Path, job.scene(), job.placement(), effects)?;
     if let Some(path) = &args.dump_wgsl {
         check_all(&[path], args.scene_file().as_slice())?;
         atomic::write(path, kernel.wgsl.as_bytes())?;
@@ -39,7 +40,7 @@ pub(super) fn run(args: &RenderArgs, json: bool) -> Result<()> {
             .map_err(|e| Error::Usage(format!("cannot write JSON: {e}")))?;
         return print(&(text + "\n"));
     }
-    print(&table(&loaded.name, &effects, lines))
+    print(&table(&loaded.name, effects, lines))
 }
 
 fn table(scene: &str, effects: &Effects, lines: usize) -> String {

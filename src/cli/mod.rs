@@ -2,9 +2,9 @@
 
 mod args;
 mod check;
+mod choices;
 mod compare;
 mod converge;
-mod device;
 mod devices;
 mod effects;
 mod fault;
@@ -22,12 +22,7 @@ use std::path::{Path, PathBuf};
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{CommandFactory as _, Parser, Subcommand};
 
-use crate::effects::Effects;
 use crate::error::{Error, Result};
-use crate::placement::media::MAX_LEVELS;
-use crate::placement::{Placement, Side};
-use crate::scene::Scene;
-use crate::settings::{Offset, Settings};
 
 pub use args::RenderArgs;
 
@@ -199,83 +194,6 @@ fn misplaced_word(error: &clap::Error) -> Option<String> {
             format!("unexpected argument '{word}': one scene is rendered at a time")
         }
     })
-}
-
-/// Placement and effects of `scene`: what every command that needs a kernel starts from.
-fn derive(scene: &Scene, settings: &Settings) -> Result<(Placement, Effects)> {
-    let placement = Placement::with_offset(scene, settings.width, settings.height, settings.offset);
-    if placement.media.levels > MAX_LEVELS {
-        return Err(Error::Scene(format!(
-            "dielectrics that touch, nest or overlap need {} levels of priority, more than \
-             {MAX_LEVELS}",
-            placement.media.levels
-        )));
-    }
-    check_magnitudes(&placement)?;
-    check_lens(scene, &placement)?;
-    let effects = Effects::derive(scene, &placement, settings);
-    Ok((placement, effects))
-}
-
-/// Refuses what the kernel's f32 cannot hold in the scene's own unit: next to a sphere of radius 1e20,
-/// one of radius 1e-20 has no size left.
-fn check_magnitudes(placement: &Placement) -> Result<()> {
-    let refuse = |what: &str| {
-        Err(Error::Scene(format!(
-            "{what} in units of the whole scene is a number that the device cannot hold: the \
-             scene's lengths lie too many orders of magnitude apart"
-        )))
-    };
-    for sphere in &placement.spheres {
-        let radius = sphere.radius as f32;
-        // The kernel needs the inverse, too.
-        if !radius.is_normal() || !radius.recip().is_normal() {
-            return refuse(&format!("the radius of sphere {}", sphere.source + 1));
-        }
-        if !sphere.anchor.as_vec3().is_finite() {
-            return refuse(&format!("the center of sphere {}", sphere.source + 1));
-        }
-    }
-    if let Some(distances) = placement.offset.distances()
-        && !distances.iter().all(|x| (*x as f32).is_finite())
-    {
-        return refuse("the distance of --offset");
-    }
-    if !placement.light.is_finite() {
-        return Err(Error::Scene(
-            "the brightest light of the scene is too dark to compute with".into(),
-        ));
-    }
-    let camera = &placement.camera;
-    if !(camera.approach as f32).is_finite() {
-        return refuse("the camera's distance from the scene");
-    }
-    let lens = [camera.lens_across, camera.lens_down].map(|axis| axis.as_vec3());
-    let focus = [camera.focus as f32, camera.lens_share as f32];
-    if !lens.iter().all(|axis| axis.is_finite()) || !focus.iter().all(|x| x.is_finite()) {
-        return refuse("the camera's lens");
-    }
-    Ok(())
-}
-
-/// Refuses a lens that straddles one of several dielectrics that share points: the points of the lens
-/// would be in different media, and paths start in one.
-fn check_lens(scene: &Scene, placement: &Placement) -> Result<()> {
-    if placement.media.levels == 0 || placement.offset != Offset::Exact {
-        return Ok(());
-    }
-    let straddled = placement
-        .spheres
-        .iter()
-        .find(|s| s.side == Side::Sign && scene.materials[s.material].kind.transmits());
-    match straddled {
-        None => Ok(()),
-        Some(sphere) => Err(Error::Scene(format!(
-            "the lens lies on both sides of sphere {}, a dielectric, in a scene where dielectrics \
-             share points: make `aperture_radius` smaller, or move the camera",
-            sphere.source + 1
-        ))),
-    }
 }
 
 /// Prints a result. A reader that has seen enough (`| head`) is no error.

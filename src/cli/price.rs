@@ -6,15 +6,15 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use serde_json::{Value, json};
 
-use super::args::{BackendArg, RenderArgs};
-use super::device::{Choice, open};
+use super::args::RenderArgs;
+use super::choices::{self, Wanted};
 use super::format::{duration, percent, significant};
 use super::signals::Signals;
-use super::{derive, print, values};
-use crate::backend::{LEAST_PIXEL_BYTES, check_memory};
+use super::{print, values};
+use crate::backend::{Backend, BackendChoice, LEAST_PIXEL_BYTES, check_memory};
 use crate::error::{Error, Result};
-use crate::estimate::{VarianceClass, variance_class};
 use crate::forecast::{self, Forecast, Pilot};
+use crate::job::prepare;
 use crate::output::Progress;
 use crate::scene::builtin;
 use crate::settings::{MAXIMUM_SPP, Rect, Settings};
@@ -58,13 +58,13 @@ pub(super) struct PriceArgs {
     #[arg(
         long,
         value_name = "LIST",
-        value_enum,
+        value_parser = choices::backend(),
         value_delimiter = ',',
         conflicts_with = "backend",
         hide_possible_values = true,
         help_heading = "Device"
     )]
-    pub(super) backends: Vec<BackendArg>,
+    pub(super) backends: Vec<Wanted>,
     /// About how long to measure, on each backend.
     #[arg(long, value_name = "TIME", value_parser = values::time, default_value = "5s",
           help_heading = "How long")]
@@ -89,25 +89,15 @@ struct Quote {
 /// Runs `price`.
 pub(super) fn run(args: &PriceArgs) -> Result<()> {
     let render = &args.render;
-    if render.adaptive {
-        return Err(Error::Usage(
-            "price knows what samples cost that go everywhere alike: leave --adaptive out".into(),
-        ));
-    }
     let loaded = builtin::resolve(render.scene.as_deref())?;
-    let settings = render.settings(&loaded.scene)?;
+    let job = prepare(&loaded.scene, &render.settings(&loaded.scene)?)?;
+    let settings = job.settings();
+    forecast::check(&job)?;
+    // Before a device is touched; what one needs beside is known with it.
     check_memory(&settings.crop, LEAST_PIXEL_BYTES)?;
-    let (placement, effects) = derive(&loaded.scene, &settings)?;
-    let report = variance_class(&loaded.scene, &placement, &settings);
-    if report.class == VarianceClass::Infinite {
-        return Err(Error::Usage(format!(
-            "no error can be forecast: {}",
-            report.warning.unwrap_or_default()
-        )));
-    }
     let signals = Signals::listen()?;
-    let progress = Progress::new(render.progress_mode(), render.quiet);
-    let mut warnings: Vec<String> = report.warning.into_iter().collect();
+    let progress = Progress::new(render.progress, render.quiet);
+    let mut warnings: Vec<String> = job.variance().warning.iter().cloned().collect();
     if !args.json {
         let Rect { width, height, .. } = settings.crop;
         print(&format!(
@@ -122,20 +112,20 @@ pub(super) fn run(args: &PriceArgs) -> Result<()> {
         [] => std::slice::from_ref(&render.backend),
         several => several,
     };
-    for backend in chosen {
+    for wanted in chosen {
         let opening = Instant::now();
-        let choice = Choice {
-            backend: *backend,
-            ..render.device_choice()
+        let choice = BackendChoice {
+            kind: wanted.kind(),
+            ..render.backend_choice()
         };
-        let backend = open(&choice, &mut warnings)?;
+        let backend = Backend::open(&choice, &mut warnings)?;
         let setup = opening.elapsed().as_secs_f64();
         let compiling = Instant::now();
-        let mut renderer = backend.renderer(&loaded.scene, &placement, &effects, &settings)?;
+        let mut renderer = backend.renderer(&job)?;
         let compile = compiling.elapsed().as_secs_f64();
         let (device, ..) = renderer.device();
         let go_on = || signals.code().is_none();
-        let Some(pilot) = forecast::run(renderer.as_mut(), &settings, args.pilot, &go_on)? else {
+        let Some(pilot) = forecast::run(renderer.as_mut(), &job, args.pilot, &go_on)? else {
             return Err(Error::Interrupted(signals.code().unwrap_or_default()));
         };
         if pilot.is_blind() {
@@ -144,16 +134,16 @@ pub(super) fn run(args: &PriceArgs) -> Result<()> {
             ));
         }
         let quote = Quote {
-            backend: backend.name(),
+            backend: backend.kind().name(),
             device,
             setup,
             compile,
-            host_bytes: backend.pixel_bytes(&settings) as u64 * pilot.pixels,
+            host_bytes: backend.pixel_bytes(settings) as u64 * pilot.pixels,
             device_bytes: renderer.device_bytes(),
             pilot,
         };
         if !args.json {
-            print(&table(render, &quote, &settings))?;
+            print(&table(render, &quote, settings))?;
         }
         quotes.push(quote);
     }
@@ -165,7 +155,7 @@ pub(super) fn run(args: &PriceArgs) -> Result<()> {
             "scene": loaded.name, "scene_hash": loaded.hash,
             "width": settings.crop.width, "height": settings.crop.height,
             "integrator": settings.integrator.name(), "sampler": settings.sampler.name(),
-            "targets": quotes.iter().flat_map(|q| targets(render, q, &settings)).collect::<Vec<_>>(),
+            "targets": quotes.iter().flat_map(|q| targets(render, q, settings)).collect::<Vec<_>>(),
             "backends": quotes.iter().map(about).collect::<Vec<_>>(),
             "warnings": warnings,
         });

@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::time::Duration;
 
 use crate::scene::{MAX_SIDE, MAX_SPP};
-use crate::settings::Rect;
+use crate::settings::{Rect, TERMINATIONS};
 
 /// One past the largest sample index.
 const SAMPLES: u64 = MAX_SPP;
@@ -153,7 +153,7 @@ pub(super) fn crop(text: &str) -> Result<Rect, String> {
 /// A probability, in [0, 1).
 pub(super) fn termination(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
-        Ok(p) if (0.0..1.0).contains(&p) => Ok(p),
+        Ok(p) if TERMINATIONS.contains(&p) => Ok(p),
         _ => Err("a probability from 0 to below 1, as in 0.2".into()),
     }
 }

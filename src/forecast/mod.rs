@@ -4,7 +4,9 @@ mod pilot;
 mod squares;
 mod survey;
 
+use crate::error::{Error, Result};
 use crate::film::{LEAST_SAMPLES, WINDOW, next_look, window_end};
+use crate::job::Job;
 use crate::sampler::Sampler;
 
 pub use pilot::run;
@@ -12,6 +14,26 @@ pub(crate) use squares::{spread, squares};
 
 /// Two-sided quantile of the normal distribution for intervals of 95 %.
 const Z: f64 = 1.96;
+
+/// Refuses what a pilot says nothing about.
+///
+/// # Errors
+/// [`Error::Usage`] for a job whose samples do not go everywhere alike, or whose error is unknown.
+pub fn check(job: &Job) -> Result<()> {
+    if job.settings().adaptive {
+        return Err(Error::Usage(
+            "price knows what samples cost that go everywhere alike: leave --adaptive out".into(),
+        ));
+    }
+    if !job.claims().has_error_bars() {
+        let why = job.variance().warning.clone();
+        return Err(Error::Usage(format!(
+            "no error can be forecast: {}",
+            why.unwrap_or_default()
+        )));
+    }
+    Ok(())
+}
 
 /// A measured figure and its relative standard error.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -5,13 +5,13 @@ use std::ops::Range;
 use std::time::{Duration, Instant};
 
 use super::survey::{Part, Survey, floor, margin, pool};
-use super::{Measured, Pilot};
-use super::{spread, squares};
+use super::{Measured, Pilot, check, spread, squares};
 use crate::error::Result;
 use crate::estimate::Estimate;
 use crate::film::{BLOCK, Film, WINDOW, Window};
+use crate::job::Job;
 use crate::render::{Control, Renderer};
-use crate::settings::{Rect, Settings};
+use crate::settings::Rect;
 use crate::statistics::mean_and_error;
 
 /// Pieces of the survey, each timed by itself.
@@ -31,17 +31,19 @@ const WINDOWS: Range<usize> = 3..8;
 /// change by more than between the pieces of a pilot.
 const DRIFT: f64 = 0.03;
 
-/// Runs a pilot of about `budget`, or of what it needs at least, for a render with `settings`; none if
+/// Runs a pilot of about `budget`, or of what it needs at least, for `job`, of which `renderer` is; none if
 /// `go_on` says to stop in the middle.
 ///
 /// # Errors
-/// If the renderer fails.
+/// If the renderer fails, or [`check`] refuses the job.
 pub fn run(
     renderer: &mut dyn Renderer,
-    settings: &Settings,
+    job: &Job,
     budget: Duration,
     go_on: &dyn Fn() -> bool,
 ) -> Result<Option<Pilot>> {
+    check(job)?;
+    let settings = job.settings();
     let begin = Instant::now();
     let mut meter = Meter {
         renderer,

@@ -9,7 +9,6 @@ use bytemuck::Zeroable as _;
 
 use crate::allocation::{TILE, Tiles};
 use crate::aov::AovSums;
-use crate::effects::Effects;
 use crate::error::{Error, Result};
 use crate::film::{PixelSums, Tally, Window};
 use crate::gpu::aov::AovLayout;
@@ -19,11 +18,10 @@ use crate::gpu::engine::{Engine, Pass, Program, Recording};
 use crate::gpu::layout::{CameraRecord, ChosenTiles, CountersRecord, DispatchRecord};
 use crate::gpu::pace::Pace;
 use crate::gpu::region::{self, chosen_pixels, tile_at, tiles_of};
-use crate::placement::Placement;
+use crate::job::Job;
 use crate::render::{Control, Renderer};
 use crate::sampler::Sampler;
-use crate::scene::Scene;
-use crate::settings::{Integrator, Rect, Settings, stream_words};
+use crate::settings::{Integrator, Rect, stream_words};
 use crate::shader::steps::{LOOP_ITERATIONS, vertex_steps};
 use crate::shader::{Kernel, Stage, link};
 
@@ -61,13 +59,9 @@ impl GpuRenderer {
     ///
     /// # Errors
     /// [`Error::Gpu`] if the image or the scene is beyond a limit of the device, or it fails.
-    pub fn new(
-        gpu: Gpu,
-        scene: &Scene,
-        placement: &Placement,
-        effects: &Effects,
-        settings: &Settings,
-    ) -> Result<Self> {
+    pub fn new(gpu: Gpu, job: &Job) -> Result<Self> {
+        let (scene, settings) = (job.scene(), job.settings());
+        let (placement, effects) = (job.placement(), job.effects());
         let kernel = link(Stage::Path, scene, placement, effects)?;
         let (_, partial_size) = kernel
             .struct_members("Partial")

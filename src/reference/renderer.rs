@@ -10,6 +10,7 @@ use crate::allocation::Tiles;
 use crate::aov::AovSums;
 use crate::error::{Error, Result};
 use crate::film::{BLOCK, NonFinite, PixelSums, Tally, Window};
+use crate::job::Job;
 use crate::placement::Placement;
 use crate::render::{Control, Renderer};
 use crate::sampler::Sampler;
@@ -30,20 +31,15 @@ impl ReferenceRenderer {
     ///
     /// # Errors
     /// [`Error::Device`] if the threads do not start.
-    pub fn new(
-        scene: &Scene,
-        placement: &Placement,
-        settings: &Settings,
-        threads: usize,
-    ) -> Result<Self> {
+    pub fn new(job: &Job, threads: usize) -> Result<Self> {
         let threads = rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
             .build()
             .map_err(|e| Error::Device(format!("cannot start {threads} threads: {e}")))?;
         Ok(Self {
-            scene: scene.clone(),
-            placement: placement.clone(),
-            settings: settings.clone(),
+            scene: job.scene().clone(),
+            placement: job.placement().clone(),
+            settings: job.settings().clone(),
             threads,
         })
     }

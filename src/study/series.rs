@@ -2,29 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
+pub use crate::backend::BackendKind;
 use crate::sampler::Sampler;
 use crate::settings::{Integrator, Offset, Settings};
-
-/// What renders.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum BackendKind {
-    /// In f32, through wgpu.
-    Gpu,
-    /// In f64, on the processor's cores.
-    Cpu,
-}
-
-impl BackendKind {
-    /// The name on the command line.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Gpu => "gpu",
-            Self::Cpu => "cpu",
-        }
-    }
-}
 
 /// One way to render; a run is a series with a seed.
 #[derive(Clone, Copy, Debug, PartialEq)]

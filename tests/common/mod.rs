@@ -10,6 +10,7 @@ use gpu_trace::film::Film;
 use gpu_trace::gpu::device::{DRIVER_ADVICE, DeviceChoice, Gpu, open};
 use gpu_trace::gpu::probe::Probe;
 use gpu_trace::gpu::renderer::GpuRenderer;
+use gpu_trace::job::{Job, prepare};
 use gpu_trace::placement::Placement;
 use gpu_trace::reference::light::aim::{Aim, aim_pole};
 use gpu_trace::reference::renderer::ReferenceRenderer;
@@ -106,11 +107,14 @@ pub(crate) fn settings(scene: &Scene, width: u32, height: u32, spp: u64) -> Sett
     }
 }
 
+/// A job that nothing is wrong with.
+pub(crate) fn job(scene: &Scene, settings: &Settings) -> Job {
+    prepare(scene, settings).unwrap_or_else(|e| panic!("{e}"))
+}
+
 /// A renderer on the GPU.
 pub(crate) fn gpu_renderer(scene: &Scene, settings: &Settings) -> GpuRenderer {
-    let placement = Placement::with_offset(scene, settings.width, settings.height, settings.offset);
-    let effects = Effects::derive(scene, &placement, settings);
-    GpuRenderer::new(gpu(), scene, &placement, &effects, settings).unwrap_or_else(|e| panic!("{e}"))
+    GpuRenderer::new(gpu(), &job(scene, settings)).unwrap_or_else(|e| panic!("{e}"))
 }
 
 /// Renders on the GPU.
@@ -123,8 +127,7 @@ pub(crate) fn render_gpu(scene: &Scene, settings: &Settings) -> Film {
 
 /// A renderer on the CPU.
 pub(crate) fn cpu_renderer(scene: &Scene, settings: &Settings) -> ReferenceRenderer {
-    let placement = Placement::with_offset(scene, settings.width, settings.height, settings.offset);
-    ReferenceRenderer::new(scene, &placement, settings, 0).unwrap_or_else(|e| panic!("{e}"))
+    ReferenceRenderer::new(&job(scene, settings), 0).unwrap_or_else(|e| panic!("{e}"))
 }
 
 /// Renders with the CPU reference.

@@ -5,11 +5,13 @@ use std::time::Duration;
 
 use clap::Args;
 
-use crate::cli::args::{BackendArg, IntegratorArg, ProgressArg, SamplerArg};
+use crate::backend::BackendChoice;
+use crate::cli::choices::{self, Wanted};
 use crate::cli::values;
 use crate::output::ProgressMode;
+use crate::sampler::Sampler;
 use crate::scene::MAX_BOUNCES;
-use crate::settings::Offset;
+use crate::settings::{Integrator, Offset};
 use crate::study::presets::PRESETS;
 
 /// Examples, and the built-in studies.
@@ -53,7 +55,7 @@ pub(in crate::cli) struct ConvergeArgs {
         hide_possible_values = true,
         help_heading = "What is compared"
     )]
-    pub(super) integrators: Vec<IntegratorArg>,
+    pub(super) integrators: Vec<Integrator>,
     /// Sample placements: sobol, independent [default: both].
     #[arg(
         long,
@@ -64,18 +66,18 @@ pub(in crate::cli) struct ConvergeArgs {
         hide_possible_values = true,
         help_heading = "What is compared"
     )]
-    pub(super) samplers: Vec<SamplerArg>,
+    pub(super) samplers: Vec<Sampler>,
     /// What renders: gpu (f32), cpu (f64), or auto [default: auto].
     #[arg(
         long,
         alias = "backend",
         value_name = "LIST",
-        value_enum,
+        value_parser = choices::backend(),
         value_delimiter = ',',
         hide_possible_values = true,
         help_heading = "What is compared"
     )]
-    pub(super) backends: Vec<BackendArg>,
+    pub(super) backends: Vec<Wanted>,
     /// How paths leave a surface: exact, none, back:X, out:X, ulp [default: exact].
     #[arg(
         long,
@@ -127,11 +129,11 @@ pub(in crate::cli) struct ConvergeArgs {
     #[arg(
         long,
         value_name = "NAME",
-        value_enum,
+        value_parser = choices::backend(),
         hide_possible_values = true,
         help_heading = "Reference"
     )]
-    pub(super) reference_backend: Option<BackendArg>,
+    pub(super) reference_backend: Option<Wanted>,
 
     /// Directory for report, plots, figures and runs [default: SCENE-converge, or SCENE-STUDY].
     #[arg(short, long, value_name = "DIR", help_heading = "Output")]
@@ -153,7 +155,7 @@ pub(in crate::cli) struct ConvergeArgs {
         hide_default_value = true,
         help_heading = "Output"
     )]
-    pub(super) progress: ProgressArg,
+    pub(super) progress: ProgressMode,
     /// Say nothing but warnings and errors.
     #[arg(short, long, help_heading = "Output")]
     pub(super) quiet: bool,
@@ -168,12 +170,12 @@ pub(in crate::cli) struct ConvergeArgs {
 }
 
 impl ConvergeArgs {
-    pub(super) fn progress_mode(&self) -> ProgressMode {
-        match self.progress {
-            ProgressArg::Auto => ProgressMode::Auto,
-            ProgressArg::Plain => ProgressMode::Plain,
-            ProgressArg::Json => ProgressMode::Json,
-            ProgressArg::None => ProgressMode::None,
+    /// How a device is opened.
+    pub(super) fn choice(&self, wanted: Wanted) -> BackendChoice<'_> {
+        BackendChoice {
+            kind: wanted.kind(),
+            device: self.device.as_deref(),
+            threads: self.threads.map_or(0, usize::from),
         }
     }
 }

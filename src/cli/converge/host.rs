@@ -3,17 +3,16 @@
 use std::time::Instant;
 
 use super::args::ConvergeArgs;
-use crate::backend::Backend;
-use crate::cli::args::BackendArg;
-use crate::cli::derive;
-use crate::cli::device::{Choice, open};
+use crate::backend::{Backend, BackendKind};
+use crate::cli::choices::Wanted;
 use crate::cli::signals::Signals;
 use crate::error::Result;
+use crate::job::prepare;
 use crate::output::{Progress, Snapshot};
 use crate::scene::Scene;
 use crate::settings::Settings;
 use crate::study::conduct::{Host, Opened};
-use crate::study::series::{BackendKind, Series};
+use crate::study::series::Series;
 
 /// This machine.
 pub(super) struct Machine<'a> {
@@ -39,30 +38,18 @@ impl<'a> Machine<'a> {
     }
 }
 
-/// How a device is opened.
-pub(super) fn choice(args: &ConvergeArgs, backend: BackendArg) -> Choice<'_> {
-    Choice {
-        backend,
-        device: args.device.as_deref(),
-        threads: args.threads,
-    }
-}
-
 impl Host for Machine<'_> {
     fn open(&mut self, series: &Series, settings: &Settings) -> Result<Opened> {
         let begin = Instant::now();
-        let backend = match series.backend {
-            BackendKind::Gpu => BackendArg::Gpu,
-            BackendKind::Cpu => BackendArg::Cpu,
-        };
         // What there is to warn of was said when the study was planned.
-        let backend = open(&choice(self.args, backend), &mut Vec::new())?;
-        let (placement, effects) = derive(self.scene, settings)?;
+        let choice = self.args.choice(Wanted::Only(series.backend));
+        let backend = Backend::open(&choice, &mut Vec::new())?;
+        let job = prepare(self.scene, settings)?;
         let compiling = Instant::now();
-        let renderer = backend.renderer(self.scene, &placement, &effects, settings)?;
-        let compile = match backend {
-            Backend::Gpu(_) => compiling.elapsed().as_secs_f64(),
-            Backend::Cpu { .. } => 0.0,
+        let renderer = backend.renderer(&job)?;
+        let compile = match backend.kind() {
+            BackendKind::Gpu => compiling.elapsed().as_secs_f64(),
+            BackendKind::Cpu => 0.0,
         };
         Ok(Opened {
             renderer,

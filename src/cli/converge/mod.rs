@@ -24,7 +24,7 @@ pub(super) fn run(args: &ConvergeArgs) -> Result<()> {
     let plan = plan::plan(args, &mut warnings)?;
     let (study, directory) = (&plan.study, &plan.directory);
     let signals = Signals::listen()?;
-    let progress = Progress::new(args.progress_mode(), args.quiet);
+    let progress = Progress::new(args.progress, args.quiet);
     let mut store = Store::open(directory, &study.identity, args.fresh)?;
     for warning in &warnings {
         progress.warning(warning);

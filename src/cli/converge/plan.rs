@@ -4,14 +4,11 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::args::ConvergeArgs;
-use super::host::choice;
-use crate::backend::{Backend, LEAST_PIXEL_BYTES, check_memory};
-use crate::cli::args::{BackendArg, IntegratorArg, SamplerArg};
-use crate::cli::derive;
-use crate::cli::device::open;
+use crate::backend::{Backend, BackendKind, LEAST_PIXEL_BYTES, check_memory};
+use crate::cli::choices::Wanted;
 use crate::error::{Error, Result};
-use crate::estimate::variance_class;
 use crate::input::{Input, read};
+use crate::job::prepare;
 use crate::output::Format;
 use crate::sampler::Sampler;
 use crate::scene::{Loaded, builtin};
@@ -22,7 +19,7 @@ use crate::study::identity::{Identity, ReferenceIdentity, hash};
 use crate::study::presets::{Preset, preset};
 use crate::study::reference::ReferenceChoice;
 use crate::study::run::Length;
-use crate::study::series::{BackendKind, Series, product};
+use crate::study::series::{Series, product};
 use crate::study::store::Store;
 
 /// Longer side of an image where nobody says: errors are per pixel, and hardly depend on it.
@@ -87,10 +84,10 @@ pub(super) fn plan(args: &ConvergeArgs, warnings: &mut Vec<String>) -> Result<Pl
     let mut subjects = Vec::new();
     for series in series {
         let settings = series.settings(&base, args.seed);
-        let (placement, _) = derive(&loaded.scene, &settings)?;
+        let job = prepare(&loaded.scene, &settings)?;
         subjects.push(Subject {
             series,
-            variance: variance_class(&loaded.scene, &placement, &settings).class,
+            variance: job.variance().class,
         });
     }
     let directory = args.output.clone().unwrap_or_else(|| {
@@ -116,6 +113,9 @@ pub(super) fn plan(args: &ConvergeArgs, warnings: &mut Vec<String>) -> Result<Pl
             own_reference(args, preset, &base, &subjects, spp, kind)
         }
     };
+    if let ReferenceChoice::Own { series, seed, .. } = &reference {
+        prepare(&loaded.scene, &series.settings(&base, *seed))?;
+    }
     let rect = base.crop;
     let identity = Identity {
         version: env!("CARGO_PKG_VERSION").into(),
@@ -178,18 +178,15 @@ fn backends(
     preset: Option<&Preset>,
     warnings: &mut Vec<String>,
 ) -> Result<Backends> {
-    let wanted: Vec<BackendArg> = match preset {
+    let wanted: Vec<Wanted> = match preset {
         _ if !args.backends.is_empty() => args.backends.clone(),
         Some(preset) if !preset.backends.is_empty() => {
-            let arg = |kind: &BackendKind| match kind {
-                BackendKind::Gpu => BackendArg::Gpu,
-                BackendKind::Cpu => BackendArg::Cpu,
-            };
-            preset.backends.iter().map(arg).collect()
+            preset.backends.iter().copied().map(Wanted::Only).collect()
         }
-        _ => vec![BackendArg::Auto],
+        _ => vec![Wanted::Auto],
     };
-    if args.device.is_some() && wanted.iter().all(|b| *b == BackendArg::Cpu) {
+    let is = |kind| move |wanted: &Wanted| *wanted == Wanted::Only(kind);
+    if args.device.is_some() && wanted.iter().all(is(BackendKind::Cpu)) {
         return Err(Error::Usage(
             "--device chooses a GPU, --backends cpu uses none".into(),
         ));
@@ -198,16 +195,13 @@ fn backends(
         kinds: Vec::new(),
         gpu: None,
     };
-    let reference = args.reference_backend.filter(|b| *b == BackendArg::Gpu);
-    for backend in wanted.iter().copied().chain(reference) {
-        let opened = open(&choice(args, backend), warnings)?;
-        let kind = match &opened {
-            Backend::Gpu(gpu) => {
-                found.gpu = Some(gpu.summary.name.clone());
-                BackendKind::Gpu
-            }
-            Backend::Cpu { .. } => BackendKind::Cpu,
-        };
+    let reference = args.reference_backend.filter(is(BackendKind::Gpu));
+    for choice in wanted.iter().copied().chain(reference) {
+        let opened = Backend::open(&args.choice(choice), warnings)?;
+        if let Backend::Gpu(gpu) = &opened {
+            found.gpu = Some(gpu.summary.name.clone());
+        }
+        let kind = opened.kind();
         if !found.kinds.contains(&kind) && found.kinds.len() < wanted.len() {
             found.kinds.push(kind);
         }
@@ -223,39 +217,27 @@ fn series(
     backends: &[BackendKind],
 ) -> Result<Vec<Series>> {
     let termination = args.termination.unwrap_or(DEFAULT_TERMINATION);
-    let integrator = |arg: &IntegratorArg| match arg {
-        IntegratorArg::Path => Integrator::Path,
-        IntegratorArg::Bsdf => Integrator::Bsdf,
-        IntegratorArg::Nee => Integrator::Nee,
-        IntegratorArg::Lecture => Integrator::Lecture { termination },
-    };
-    let sampler = |arg: &SamplerArg| match arg {
-        SamplerArg::Sobol => Sampler::Sobol,
-        SamplerArg::Independent => Sampler::Independent,
-    };
-    let integrators: Vec<Integrator> = match preset {
-        _ if !args.integrators.is_empty() => args.integrators.iter().map(integrator).collect(),
+    let mut integrators: Vec<Integrator> = match preset {
+        _ if !args.integrators.is_empty() => args.integrators.clone(),
         Some(preset) if preset.integrators.is_empty() => vec![base.integrator],
-        Some(preset) => preset
-            .integrators
-            .iter()
-            .map(|i| match i {
-                Integrator::Lecture { .. } => Integrator::Lecture { termination },
-                other => *other,
-            })
-            .collect(),
+        Some(preset) => preset.integrators.to_vec(),
         None => vec![Integrator::Path, Integrator::Lecture { termination }],
     };
-    let lecture = |i: &Integrator| matches!(i, Integrator::Lecture { .. });
-    if args.termination.is_some() && !integrators.iter().any(lecture) {
+    for integrator in &mut integrators {
+        *integrator = integrator.with_termination(termination);
+    }
+    if args.termination.is_some() && !integrators.iter().any(|i| i.is_lecture()) {
         return Err(Error::Usage(
             "--termination is the lecture's: add lecture to --integrators".into(),
         ));
     }
-    let samplers: Vec<Sampler> = args.samplers.iter().map(sampler).collect();
     let samplers = match preset {
-        None if samplers.is_empty() => vec![Sampler::Sobol, Sampler::Independent],
-        _ => or(samplers, preset.map(|p| p.samplers), Sampler::default()),
+        None if args.samplers.is_empty() => Sampler::ALL.to_vec(),
+        _ => or(
+            args.samplers.clone(),
+            preset.map(|p| p.samplers),
+            Sampler::default(),
+        ),
     };
     let offsets = or(
         args.offsets.clone(),
@@ -292,10 +274,8 @@ fn reference_backend(
     backends: &Backends,
     directory: &Path,
 ) -> BackendKind {
-    match args.reference_backend {
-        Some(BackendArg::Cpu) => return BackendKind::Cpu,
-        Some(BackendArg::Gpu) => return BackendKind::Gpu,
-        Some(BackendArg::Auto) | None => {}
+    if let Some(kind) = args.reference_backend.and_then(Wanted::kind) {
+        return kind;
     }
     if let Some(kind) = preset.and_then(|p| p.reference) {
         return kind;
@@ -304,11 +284,10 @@ fn reference_backend(
         true => None,
         false => ReferenceIdentity::backend_in(directory),
     };
-    match there.as_deref() {
-        Some("cpu") => BackendKind::Cpu,
-        Some("gpu") => BackendKind::Gpu,
-        _ if backends.gpu.is_some() => BackendKind::Gpu,
-        _ => BackendKind::Cpu,
+    match there.and_then(|name| BackendKind::of_name(&name)) {
+        Some(kind) => kind,
+        None if backends.gpu.is_some() => BackendKind::Gpu,
+        None => BackendKind::Cpu,
     }
 }
 

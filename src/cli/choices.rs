@@ -1,0 +1,59 @@
+//! Options that choose from a list: the words are the names that the library has for what they choose.
+
+use clap::ValueEnum;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+
+use crate::backend::BackendKind;
+use crate::sampler::Sampler;
+use crate::settings::{GeometryChoice, Integrator, LightSampling};
+
+/// Lets `value_enum` take the names of a type's `ALL`.
+macro_rules! choices {
+    ($($name:ident),*) => {
+        $(
+            impl ValueEnum for $name {
+                fn value_variants<'a>() -> &'a [Self] {
+                    Self::ALL
+                }
+
+                fn to_possible_value(&self) -> Option<PossibleValue> {
+                    Some(PossibleValue::new(self.name()))
+                }
+            }
+        )*
+    };
+}
+
+choices! { Integrator, LightSampling, Sampler, GeometryChoice }
+
+/// What should render.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Wanted {
+    /// A GPU, or the CPU where none can be used.
+    Auto,
+    /// This.
+    Only(BackendKind),
+}
+
+impl Wanted {
+    /// What was asked for by name.
+    #[must_use]
+    pub fn kind(self) -> Option<BackendKind> {
+        match self {
+            Self::Auto => None,
+            Self::Only(kind) => Some(kind),
+        }
+    }
+}
+
+/// `auto`, or the name of what renders.
+pub(super) fn backend() -> impl TypedValueParser<Value = Wanted> {
+    let kinds = BackendKind::ALL.iter().map(|kind| kind.name());
+    PossibleValuesParser::new(std::iter::once("auto").chain(kinds))
+        .map(|name| BackendKind::of_name(&name).map_or(Wanted::Auto, Wanted::Only))
+}
+
+/// `on` or `off`.
+pub(super) fn switch() -> impl TypedValueParser<Value = bool> {
+    PossibleValuesParser::new(["on", "off"]).map(|word| word == "on")
+}
