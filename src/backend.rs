@@ -1,8 +1,8 @@
 //! What renders: an opened GPU, or the CPU reference.
 
-use crate::aov::AovSums;
 use crate::effects::Effects;
 use crate::error::{Error, Result};
+use crate::film::AovSums;
 use crate::gpu::device::Gpu;
 use crate::gpu::renderer::GpuRenderer;
 use crate::output::numbers::significant;

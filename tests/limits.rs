@@ -9,9 +9,8 @@ use std::ops::Range;
 use std::time::Duration;
 
 use common::{gpu_renderer, means, render_cpu, render_gpu, scene, settings};
-use gpu_trace::allocation::Tiles;
 use gpu_trace::error::{Error, Result};
-use gpu_trace::film::{Film, PixelSums, Tally, Window};
+use gpu_trace::film::{Film, PixelSums, Tally, Tiles, Window};
 use gpu_trace::gpu::renderer::DispatchLimits;
 use gpu_trace::render::{Control, Renderer, Status, StoppedBy, Watch, render, render_quietly};
 use gpu_trace::settings::{Rect, Settings};

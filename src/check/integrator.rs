@@ -4,13 +4,13 @@ use super::context::{Context, SceneText, means};
 use super::film::must;
 use super::{Case, Measure, Run};
 use crate::error::Result;
-use crate::estimate::{VarianceClass, variance_class};
 use crate::film::{BLOCK, Film};
 use crate::placement::Placement;
 use crate::sampler::Sampler;
 use crate::scene::Scene;
 use crate::settings::{Integrator, Settings};
 use crate::statistics::mean_and_error;
+use crate::variance::{VarianceClass, variance_class};
 
 pub(super) const CASES: &[Case] = &[
     Case {

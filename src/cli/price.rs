@@ -13,11 +13,11 @@ use super::signals::Signals;
 use super::{derive, print, values};
 use crate::backend::{LEAST_PIXEL_BYTES, check_memory};
 use crate::error::{Error, Result};
-use crate::estimate::{VarianceClass, variance_class};
 use crate::forecast::{self, Forecast, Pilot};
 use crate::output::Progress;
 use crate::scene::builtin;
 use crate::settings::{MAXIMUM_SPP, Rect, Settings};
+use crate::variance::{VarianceClass, variance_class};
 
 pub(super) const AFTER_HELP: &str = "\
 Takes the options of a render and says what that render would cost; it writes no image.

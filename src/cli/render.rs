@@ -12,7 +12,6 @@ use super::{derive, print};
 use crate::backend::{Backend, LEAST_PIXEL_BYTES, check_memory};
 use crate::effects::Effects;
 use crate::error::{Error, Result};
-use crate::estimate::{VarianceClass, VarianceReport, energy_cut_at_most, variance_class};
 use crate::film::NonFinite;
 use crate::gpu::device::Gpu;
 use crate::ledger::{self, Entry};
@@ -27,6 +26,7 @@ use crate::scene::builtin;
 use crate::scene::load::Loaded;
 use crate::settings::{MAXIMUM_SPP, Settings};
 use crate::shader::{Stage, link};
+use crate::variance::{VarianceClass, VarianceReport, energy_cut_at_most, variance_class};
 
 /// Everything about a render that is decided before a device is touched.
 struct Job {

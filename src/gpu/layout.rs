@@ -7,8 +7,8 @@
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 
-use crate::allocation::{TILE, Tiles};
 use crate::effects::Effects;
+use crate::film::{TILE, Tiles};
 use crate::lights::Light;
 use crate::placement::{PlacedCamera, PlacedSphere, Placement};
 use crate::scene::{Material, MaterialKind, luminance};

@@ -7,11 +7,9 @@ use std::time::{Duration, Instant};
 use bytemuck::Zeroable as _;
 use wgpu::util::DeviceExt as _;
 
-use crate::allocation::{TILE, Tiles};
-use crate::aov::AovSums;
 use crate::effects::Effects;
 use crate::error::{Error, Result};
-use crate::film::{BLOCK, NonFinite, PixelSums, Tally, Window};
+use crate::film::{AovSums, BLOCK, NonFinite, PixelSums, TILE, Tally, Tiles, Window};
 use crate::gpu::aov::AovLayout;
 use crate::gpu::device::Gpu;
 use crate::gpu::layout::{CameraRecord, ChosenTiles, CountersRecord, DispatchRecord};

@@ -1,9 +1,7 @@
 //! What an EXR file can hold beside the image (`--aov`), and its values.
 
 use super::Layer;
-use crate::aov::{AovSums, LightClass};
-use crate::estimate::Estimate;
-use crate::film::Film;
+use crate::film::{AovSums, Estimate, Film, LightClass};
 
 /// A layer, by its name in the file and on the command line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]

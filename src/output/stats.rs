@@ -7,10 +7,10 @@ use serde::Serialize;
 
 use super::{Metadata, atomic};
 use crate::error::{Error, Result};
-pub use crate::estimate::VarianceClass;
 pub use crate::film::NonFinite;
 pub use crate::ledger::Entry;
 pub use crate::render::StoppedBy;
+pub use crate::variance::VarianceClass;
 
 /// All that is known of a finished render. The names are those of the JSON, which users' scripts
 /// rely on: add members, but rename and remove none.

@@ -8,7 +8,7 @@ use super::fit::{bias_fit, slope, value_at};
 use super::measure::Noise;
 use super::run::{Point, Run};
 use super::series::{Key, Series, labels};
-use crate::estimate::VarianceClass;
+use crate::variance::VarianceClass;
 
 /// Samples a pixel from which slopes are fitted, where there are enough points: before that, pixels
 /// are black or bright by chance.

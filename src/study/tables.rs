@@ -4,8 +4,8 @@ use super::analysis::{Analysis, Summary};
 use super::bootstrap::Interval;
 use super::equal::{EqualError, EqualTime};
 use super::pictures::Pair;
-use crate::estimate::VarianceClass;
 use crate::output::numbers::{duration, percent, significant};
+use crate::variance::VarianceClass;
 
 /// A table.
 #[derive(Clone, Debug)]

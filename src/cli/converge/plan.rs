@@ -10,7 +10,6 @@ use crate::cli::args::{BackendArg, IntegratorArg, SamplerArg};
 use crate::cli::derive;
 use crate::cli::device::open;
 use crate::error::{Error, Result};
-use crate::estimate::variance_class;
 use crate::input::{Input, read};
 use crate::output::Format;
 use crate::sampler::Sampler;
@@ -24,6 +23,7 @@ use crate::study::reference::ReferenceChoice;
 use crate::study::run::Length;
 use crate::study::series::{BackendKind, Series, product};
 use crate::study::store::Store;
+use crate::variance::variance_class;
 
 /// Longer side of an image where nobody says: errors are per pixel, and hardly depend on it.
 const SIDE: u32 = 160;

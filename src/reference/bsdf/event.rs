@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use crate::aov::LightClass;
+use crate::film::LightClass;
 use crate::scene::MaterialKind;
 
 /// Whether a path that goes on in direction `w` does so by a delta lobe or within the lobe of a
