@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use crate::film::AovSums;
 use crate::gpu::device::Gpu;
 use crate::gpu::renderer::GpuRenderer;
-use crate::output::numbers::significant;
+use crate::numbers::significant;
 use crate::placement::Placement;
 use crate::reference::path::ReferenceRenderer;
 use crate::render::Renderer;

@@ -18,12 +18,12 @@
 //!    [`variance`]: whether samples can show their variance.
 //! 10. [`forecast`]: what an error will cost, from a pilot. [`ledger`]: how much light inexact settings
 //!     took.
-//! 11. [`output`]: images, statistics, progress.
+//! 11. [`image`](mod@image): what is written and read. [`output`]: images, statistics, progress.
 //! 12. [`input`] and [`compare`](mod@compare): images of any origin, and how far two are apart.
 //!
 //! [`study`] measures what accuracy costs in time.
 //! [`check`] measures the hard cases of all this on a device, with the tests of [`statistics`].
-//! [`error`] is what can go wrong anywhere.
+//! [`numbers`] is how people read them. [`error`] is what can go wrong anywhere.
 
 pub mod backend;
 pub mod check;
@@ -35,10 +35,12 @@ pub mod error;
 pub mod film;
 pub mod forecast;
 pub mod gpu;
+pub mod image;
 pub mod input;
 pub mod ledger;
 pub mod lights;
 pub mod media;
+pub mod numbers;
 pub mod output;
 pub mod placement;
 pub mod reference;

@@ -14,11 +14,11 @@ use crate::effects::Effects;
 use crate::error::{Error, Result};
 use crate::film::NonFinite;
 use crate::gpu::device::Gpu;
+use crate::image::{Format, Picture};
 use crate::ledger::{self, Entry};
 use crate::output::stats::{BounceLimit, Device, Seconds};
 use crate::output::{
-    Aov, Contents, Format, Layer, Picture, Plane, Progress, Snapshot, Stats, Target, atomic,
-    check_all, write_all,
+    Aov, Contents, Layer, Plane, Progress, Snapshot, Stats, Target, atomic, check_all, write_all,
 };
 use crate::placement::Placement;
 use crate::render::{Outcome, Renderer, Status, StoppedBy, Watch, render};

@@ -3,7 +3,7 @@
 //! 1. [`window`]: what a renderer hands over; [`aov`]: what a pixel can hold beside its light.
 //! 2. [`allocation`]: how samples are shared out over the image.
 //! 3. [`sums`]: f64 sums and variances over all windows.
-//! 4. [`estimate`]: mean and error. [`intervals`]: those of single values. [`adaptive`]: where further
+//! 4. [`estimate`]: mean and error. [`intervals`]: those of single values. `adaptive`: where further
 //!    samples go.
 
 mod adaptive;

@@ -6,7 +6,7 @@ use super::analysis::{Analysis, Subject};
 use super::series::{Series, labels};
 use super::store::Store;
 use crate::compare::{Errors, HeatMap};
-use crate::output::Picture;
+use crate::image::Picture;
 
 /// An image with what the report says of it.
 #[derive(Clone, Debug)]

@@ -7,8 +7,10 @@ use super::store::{REFERENCE, Store};
 use super::timetable::{Part, Timetable};
 use crate::error::{Error, Result};
 use crate::film::Film;
+use crate::image::exr::{RGB, STDERR};
+use crate::image::{Format, Picture};
 use crate::input::{Input, read};
-use crate::output::{Contents, Format, Layer, Metadata, Picture, Value};
+use crate::output::{Contents, Layer, Metadata, Value};
 
 /// What errors are measured against.
 #[derive(Debug)]
@@ -108,8 +110,8 @@ fn encode(film: &Film, metadata: Metadata) -> std::io::Result<Vec<u8>> {
     let layers: Vec<Layer<'_>> = errors
         .iter()
         .map(|values| Layer {
-            name: "stderr",
-            channels: &["R", "G", "B"],
+            name: STDERR,
+            channels: RGB,
             values: values.as_flattened(),
         })
         .collect();

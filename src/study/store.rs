@@ -14,7 +14,9 @@ use super::identity::{Identity, ReferenceIdentity, differs, plain};
 use super::run::Run;
 use crate::error::{Error, Result};
 use crate::film::Film;
-use crate::output::{Picture, atomic, npy, read_npy};
+use crate::image::Picture;
+use crate::input::read;
+use crate::output::{atomic, npy};
 
 /// An open directory.
 #[derive(Debug)]
@@ -114,7 +116,7 @@ impl Store {
     /// An image that was kept; `None` if there is none of the study's size that can be read.
     #[must_use]
     pub fn image(&self, name: &str) -> Option<Picture> {
-        let picture = read_npy(&self.path(&image_path(name))).ok()?;
+        let picture = read(&self.path(&image_path(name))).ok()?.picture;
         ([picture.width, picture.height] == self.size).then_some(picture)
     }
 

@@ -13,8 +13,8 @@ use super::store::{FILES, Store};
 use super::tables;
 use crate::compare::HeatMap;
 use crate::error::{Error, Result};
-use crate::output::Picture;
-use crate::output::numbers::{percent, significant};
+use crate::image::Picture;
+use crate::numbers::{percent, significant};
 use crate::variance::VarianceClass;
 
 /// Writes all files of a study.

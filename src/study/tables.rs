@@ -4,7 +4,7 @@ use super::analysis::{Analysis, Summary};
 use super::bootstrap::Interval;
 use super::equal::{EqualError, EqualTime};
 use super::pictures::Pair;
-use crate::output::numbers::{duration, percent, significant};
+use crate::numbers::{duration, percent, significant};
 use crate::variance::VarianceClass;
 
 /// A table.

@@ -14,8 +14,9 @@ use super::format::percent;
 use super::{print, values};
 use crate::compare::{DEFAULT_PPD, HeatMap, Options, Report, check_same, compare};
 use crate::error::{Error, Result};
+use crate::image::Format;
 use crate::input::{Input, read};
-use crate::output::{Format, Target, atomic, check_all};
+use crate::output::{Target, atomic, check_all};
 
 pub(super) const AFTER_HELP: &str = "\
 Examples:
