@@ -5,13 +5,14 @@
 //!    time. [`run`]: one series with one seed. [`measure`]: its error against the reference.
 //! 3. [`store`]: the directory with all that is finished, so that a study can go on; [`identity`]: which study.
 //! 4. [`analysis`]: what the runs say, by [`fit`] and [`bootstrap`]; [`equal`]: at equal time and error.
-//! 5. [`tables`], [`plot`], [`pictures`], [`export`] and [`report`]: how it is shown.
+//! 5. [`tables`], [`plot`], [`pictures`], [`export`] and [`report`]: how it is shown; [`files`] writes it.
 
 pub mod analysis;
 pub mod bootstrap;
 pub mod conduct;
 pub mod equal;
 pub mod export;
+pub mod files;
 pub mod fit;
 pub mod identity;
 pub mod measure;
@@ -23,7 +24,6 @@ pub mod report;
 pub mod run;
 pub mod series;
 pub mod store;
-pub mod summary;
 pub mod tables;
 mod ticks;
 mod timetable;
