@@ -1,15 +1,15 @@
 //! What a study leaves: CSV, JSON, plots and the report.
 
-use super::analysis::{Level, Summary};
-use super::conduct::{Outcome, Study};
+use super::conduct::Outcome;
 use super::export::{Document, csv};
 use super::pictures::{Pair, Shot, align, pairs, sample_image};
+use super::plan::{ReferenceChoice, Study};
 use super::plot::{Axis, Curve, Plot};
-use super::reference::ReferenceChoice;
 use super::report::{Gallery, Report};
 use super::run::Run;
 use super::series::labels;
 use super::store::{FILES, Store};
+use super::summary::{Level, Summary};
 use super::tables;
 use crate::compare::HeatMap;
 use crate::error::{Error, Result};

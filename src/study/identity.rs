@@ -1,12 +1,9 @@
 //! What makes a study the same study: only then do its runs say something about each other.
 
-use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
-
-use super::store::RUNS;
 
 /// What all runs of a directory share: runs of another scene, size, length or reference, or of
 /// another version of the program, say nothing about these.
@@ -56,20 +53,6 @@ pub enum ReferenceIdentity {
         /// The most scattering events.
         max_bounces: u32,
     },
-}
-
-impl ReferenceIdentity {
-    /// What rendered the reference of the study in a directory, if there is one and it is its own.
-    #[must_use]
-    pub fn backend_in(directory: &Path) -> Option<String> {
-        let bytes = fs::read(directory.join(RUNS)).ok()?;
-        let line = bytes.split(|b| *b == b'\n').next()?;
-        let identity: Identity = serde_json::from_slice(line).ok()?;
-        match identity.reference {
-            Self::Own { backend, .. } => Some(backend),
-            Self::File { .. } => None,
-        }
-    }
 }
 
 /// The first member in which two identities differ.

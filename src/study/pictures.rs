@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 
-use super::analysis::{Analysis, Subject};
-use super::series::{Series, labels};
+use super::analysis::Analysis;
+use super::series::{Series, Subject, labels};
 use super::store::Store;
 use crate::compare::{Errors, HeatMap};
 use crate::image::Picture;

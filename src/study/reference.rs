@@ -1,6 +1,7 @@
 //! The image that a study measures errors against: a file, or a long render of its own.
 
-use super::conduct::{Keeper, Study};
+use super::keeper::Keeper;
+use super::plan::{ReferenceChoice, Study};
 use super::run::advance;
 use super::series::Series;
 use super::store::{REFERENCE, Store};
@@ -11,22 +12,6 @@ use crate::image::exr::{RGB, STDERR};
 use crate::image::{Format, Picture};
 use crate::input::{Input, read};
 use crate::output::{Contents, Layer, Metadata, Value};
-
-/// What errors are measured against.
-#[derive(Debug)]
-pub enum ReferenceChoice {
-    /// An image from a file.
-    File(Box<Input>),
-    /// A long render.
-    Own {
-        /// How it is rendered.
-        series: Series,
-        /// Samples a pixel.
-        spp: u64,
-        /// No run has it.
-        seed: u64,
-    },
-}
 
 /// The reference: from its file, or from the study's directory, or rendered and put there; `None` if
 /// it was stopped before the end.

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::sampler::Sampler;
 use crate::settings::{Integrator, Offset, Settings};
+use crate::variance::VarianceClass;
 
 /// What renders.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -39,6 +40,15 @@ pub struct Series {
     pub offset: Offset,
     /// The most scattering events of a path.
     pub max_bounces: u32,
+}
+
+/// A series and what is known of its variance beforehand.
+#[derive(Clone, Copy, Debug)]
+pub struct Subject {
+    /// The series.
+    pub series: Series,
+    /// Whether its mean square error has a mean.
+    pub variance: VarianceClass,
 }
 
 /// A series as files name it: runs belong to the series whose key is the same.

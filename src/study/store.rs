@@ -247,6 +247,18 @@ impl Store {
     }
 }
 
+/// What rendered the reference of the study in a directory, if there is one and it is its own.
+#[must_use]
+pub fn backend_of_reference(directory: &Path) -> Option<String> {
+    let bytes = fs::read(directory.join(RUNS)).ok()?;
+    let line = bytes.split(|b| *b == b'\n').next()?;
+    let identity: Identity = serde_json::from_slice(line).ok()?;
+    match identity.reference {
+        ReferenceIdentity::Own { backend, .. } => Some(backend),
+        ReferenceIdentity::File { .. } => None,
+    }
+}
+
 fn image_path(name: &str) -> String {
     format!("{IMAGES}/{name}.npy")
 }

@@ -1,9 +1,10 @@
 //! The figures as tables of text, for the report and the terminal.
 
-use super::analysis::{Analysis, Summary};
+use super::analysis::Analysis;
 use super::bootstrap::Interval;
 use super::equal::{EqualError, EqualTime};
 use super::pictures::Pair;
+use super::summary::Summary;
 use crate::numbers::{duration, percent, significant};
 use crate::variance::VarianceClass;
 
@@ -342,10 +343,10 @@ mod tests {
     use super::*;
     use crate::sampler::Sampler;
     use crate::settings::{Integrator, Offset};
-    use crate::study::analysis::{Subject, analyse};
+    use crate::study::analysis::analyse;
     use crate::study::measure::Noise;
     use crate::study::run::{Point, Run};
-    use crate::study::series::{BackendKind, Series};
+    use crate::study::series::{BackendKind, Series, Subject};
 
     /// The time to 20 %, by series, of runs with these relRMSEs at 1, 2, 4, ... samples.
     fn times(errors: [&[f64]; 2], hidden: f64) -> [String; 2] {

@@ -12,7 +12,7 @@ use crate::error::Result;
 use crate::output::{Progress, Snapshot};
 use crate::scene::Scene;
 use crate::settings::Settings;
-use crate::study::conduct::{Host, Opened};
+use crate::study::host::{Host, Opened};
 use crate::study::series::{BackendKind, Series};
 
 /// This machine.

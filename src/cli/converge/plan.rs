@@ -15,14 +15,12 @@ use crate::input::{Input, read};
 use crate::sampler::Sampler;
 use crate::scene::{Loaded, builtin};
 use crate::settings::{DEFAULT_TERMINATION, Integrator, Offset, Rect, Settings};
-use crate::study::analysis::Subject;
-use crate::study::conduct::Study;
 use crate::study::identity::{Identity, ReferenceIdentity, hash};
+use crate::study::plan::{ReferenceChoice, Study};
 use crate::study::presets::{Preset, preset};
-use crate::study::reference::ReferenceChoice;
 use crate::study::run::Length;
-use crate::study::series::{BackendKind, Series, product};
-use crate::study::store::Store;
+use crate::study::series::{BackendKind, Series, Subject, product};
+use crate::study::store::{Store, backend_of_reference};
 use crate::variance::variance_class;
 
 /// Longer side of an image where nobody says: errors are per pixel, and hardly depend on it.
@@ -302,7 +300,7 @@ fn reference_backend(
     }
     let there = match args.fresh {
         true => None,
-        false => ReferenceIdentity::backend_in(directory),
+        false => backend_of_reference(directory),
     };
     match there.as_deref() {
         Some("cpu") => BackendKind::Cpu,
