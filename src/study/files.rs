@@ -2,18 +2,16 @@
 
 use super::conduct::Outcome;
 use super::export::{Document, csv};
-use super::pictures::{Pair, Shot, align, pairs, sample_image};
+use super::galleries::galleries;
+use super::pictures::{Pair, pairs};
 use super::plan::{ReferenceChoice, Study};
 use super::plot::{Axis, Curve, Plot};
-use super::report::{Gallery, Report};
+use super::report::Report;
 use super::run::Run;
-use super::series::labels;
 use super::store::{FILES, Store};
 use super::summary::{Level, Summary};
 use super::tables;
-use crate::compare::HeatMap;
 use crate::error::{Error, Result};
-use crate::image::Picture;
 use crate::numbers::{percent, significant};
 use crate::variance::VarianceClass;
 
@@ -46,15 +44,20 @@ pub fn write(study: &Study, store: &Store, outcome: &Outcome, warnings: &[String
     };
     let report = report(study, store, outcome, &pairs, &plots, warnings)?;
     let [time, spp] = &plots;
+    let csv = csv(analysis, &runs, outcome.noise).map_err(|source| Error::File {
+        action: "cannot write",
+        path: store.path(FILES[0]),
+        source,
+    })?;
     let contents = [
-        csv(analysis, &runs, outcome.noise),
-        document.json(),
-        time.file(),
-        spp.file(),
-        report,
+        csv,
+        document.json().into_bytes(),
+        time.file().into_bytes(),
+        spp.file().into_bytes(),
+        report.into_bytes(),
     ];
-    for (name, text) in FILES.iter().zip(contents) {
-        store.write(name, text.as_bytes())?;
+    for (name, bytes) in FILES.iter().zip(contents) {
+        store.write(name, &bytes)?;
     }
     Ok(())
 }
@@ -172,11 +175,7 @@ fn report(
         tables::biases(analysis),
     ];
     tables.extend(tables::precision(pairs));
-    let galleries = [
-        shown(study, store, outcome),
-        equal_time(study, store, outcome),
-        precise(store, pairs),
-    ];
+    let galleries = galleries(study, store, outcome, pairs);
     let report = Report {
         title: format!("{}: {}", study.title, study.loaded.name),
         lead: lead(outcome),
@@ -296,104 +295,4 @@ fn facts(study: &Study, outcome: &Outcome) -> Vec<(&'static str, String)> {
     ));
     facts.push(("Program", format!("gpu-trace {}", identity.version)));
     facts
-}
-
-fn shot(label: &str, caption: String, picture: Picture, against: &Picture) -> Shot {
-    Shot {
-        label: label.into(),
-        caption,
-        difference: HeatMap::of(&picture, against),
-        picture,
-    }
-}
-
-fn gallery(title: &str, note: &str, mut shots: Vec<Shot>, images: bool) -> Gallery {
-    align(&mut shots);
-    Gallery {
-        title: title.into(),
-        note: note.into(),
-        shots,
-        images,
-    }
-}
-
-fn shown(study: &Study, store: &Store, outcome: &Outcome) -> Gallery {
-    let mut shots = Vec::new();
-    let series: Vec<_> = study.subjects.iter().map(|s| s.series).collect();
-    for (series, label) in series.iter().zip(labels(&series)) {
-        let summary = outcome
-            .analysis
-            .series
-            .iter()
-            .find(|s| s.series == series.key());
-        for spp in &study.shown {
-            let level = summary.and_then(|s| s.levels.iter().find(|l| l.spp == *spp));
-            let image = store.image(&sample_image(series, study.seeds.start, *spp));
-            let Some((level, picture)) = level.zip(image) else {
-                continue;
-            };
-            let error = level
-                .error
-                .map_or("error unknown".into(), |e| format!("error {}", percent(e)));
-            let caption = format!("{error}, {}", tables::seconds(level.seconds));
-            let name = match series_count(study) {
-                1 => format!("{spp} samples a pixel"),
-                _ => format!("{label}, {spp} samples a pixel"),
-            };
-            shots.push(shot(&name, caption, picture, &outcome.picture));
-        }
-    }
-    gallery(
-        "Images at growing numbers of samples",
-        "Each with the map of its relative error against the reference.",
-        shots,
-        true,
-    )
-}
-
-fn series_count(study: &Study) -> usize {
-    study.subjects.len()
-}
-
-fn equal_time(study: &Study, store: &Store, outcome: &Outcome) -> Gallery {
-    let series: Vec<_> = study.subjects.iter().map(|s| s.series).collect();
-    let names = labels(&series);
-    let time = outcome
-        .analysis
-        .equal_time
-        .last()
-        .map_or(0.0, |t| t.seconds);
-    let shots = outcome.equal_time.iter().filter_map(|(index, spp, name)| {
-        let picture = store.image(name)?;
-        let difference = crate::compare::Errors::of(&picture, &outcome.picture)?;
-        let caption = format!(
-            "{spp} spp, {} from the reference",
-            percent(difference.relrmse)
-        );
-        Some(shot(&names[*index], caption, picture, &outcome.picture))
-    });
-    gallery(
-        &format!("Images at equal time: {}", tables::seconds(time)),
-        "Setup and compilation included, each with as many samples as fit, and with the map of its relative \
-         error against the reference.",
-        shots.collect(),
-        true,
-    )
-}
-
-fn precise(store: &Store, pairs: &[Pair]) -> Gallery {
-    let shots = pairs.iter().filter_map(|pair| {
-        let (image, exact) = pair.last.as_ref()?;
-        let (image, exact) = (store.image(image)?, store.image(exact)?);
-        let level = pair.levels.last()?;
-        let caption = format!("{} spp, {} apart", level.spp, percent(level.relrmse));
-        Some(shot(&pair.label, caption, image, &exact))
-    });
-    gallery(
-        "f32 against f64, the same samples",
-        "Where the image of a series differs from that of the CPU in f64 without a nudge. Both have the same \
-         noise, so that this is precision and the nudge alone.",
-        shots.collect(),
-        false,
-    )
 }

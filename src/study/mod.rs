@@ -7,7 +7,7 @@
 //!    reference, the runs in turns, images at equal time.
 //! 4. [`summary`]: what the runs of a series say, by [`fit`] and [`bootstrap`]; [`equal`]: at equal time and
 //!    error; [`analysis`]: all of it.
-//! 5. [`tables`], [`plot`], [`pictures`], [`export`] and [`report`]: how it is shown; [`files`] writes it.
+//! 5. [`tables`] (each a [`table`]), [`plot`], [`pictures`], [`export`] and [`report`]: how it is shown; [`files`] writes it.
 
 pub mod analysis;
 pub mod bootstrap;
@@ -16,6 +16,7 @@ pub mod equal;
 pub mod export;
 pub mod files;
 pub mod fit;
+mod galleries;
 pub mod host;
 pub mod identity;
 mod keeper;
@@ -30,6 +31,7 @@ pub mod run;
 pub mod series;
 pub mod store;
 pub mod summary;
+pub mod table;
 pub mod tables;
-mod ticks;
+
 mod timetable;

@@ -8,7 +8,7 @@ use base64::engine::general_purpose::STANDARD;
 
 use super::pictures::Shot;
 use super::plot::{Plot, escape, style};
-use super::tables::Table;
+use super::table::Table;
 use crate::compare::{HeatMap, heat_colour};
 use crate::image::{Format, Picture};
 use crate::numbers::percent;

@@ -116,6 +116,21 @@ impl Series {
         format!("{integrator}{termination}-{sampler}-{backend}-{offset}-{max_bounces}")
     }
 
+    /// What decides the kernel: all but what renders, for the f64 twin changes with it.
+    #[must_use]
+    pub fn way(&self) -> String {
+        let Key {
+            integrator,
+            termination,
+            sampler,
+            backend: _,
+            offset,
+            max_bounces,
+        } = self.key();
+        let termination = termination.map_or_else(String::new, |p| format!(" {p}"));
+        format!("{integrator}{termination} {sampler} {offset} {max_bounces}")
+    }
+
     /// The same paths in f64 without any nudge: what rounding and nudges are told by.
     #[must_use]
     pub fn truth(&self) -> Self {

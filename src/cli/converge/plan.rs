@@ -1,5 +1,7 @@
 //! From options to a study: everything is decided and checked before anything is rendered.
 
+use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -15,7 +17,7 @@ use crate::input::{Input, read};
 use crate::sampler::Sampler;
 use crate::scene::{Loaded, builtin};
 use crate::settings::{DEFAULT_TERMINATION, Integrator, Offset, Rect, Settings};
-use crate::study::identity::{Identity, ReferenceIdentity, hash};
+use crate::study::identity::{Identity, ReferenceIdentity, hash, kernel_hash};
 use crate::study::plan::{ReferenceChoice, Study};
 use crate::study::presets::{Preset, preset};
 use crate::study::run::Length;
@@ -83,9 +85,13 @@ pub(super) fn plan(args: &ConvergeArgs, warnings: &mut Vec<String>) -> Result<Pl
     let backends = backends(args, preset, warnings)?;
     let series = series(args, &base, preset, &backends.kinds)?;
     let mut subjects = Vec::new();
+    let mut kernels = BTreeMap::new();
     for series in series {
         let settings = series.settings(&base, args.seed);
-        let (placement, _) = derive(&loaded.scene, &settings)?;
+        let (placement, effects) = derive(&loaded.scene, &settings)?;
+        if let Entry::Vacant(kernel) = kernels.entry(series.way()) {
+            kernel.insert(kernel_hash(&loaded.scene, &placement, &effects)?);
+        }
         subjects.push(Subject {
             series,
             variance: variance_class(&loaded.scene, &placement, &settings).class,
@@ -114,6 +120,12 @@ pub(super) fn plan(args: &ConvergeArgs, warnings: &mut Vec<String>) -> Result<Pl
             own_reference(args, preset, &base, &subjects, spp, kind)
         }
     };
+    if let ReferenceChoice::Own { series, seed, .. } = &reference
+        && let Entry::Vacant(kernel) = kernels.entry(series.way())
+    {
+        let (placement, effects) = derive(&loaded.scene, &series.settings(&base, *seed))?;
+        kernel.insert(kernel_hash(&loaded.scene, &placement, &effects)?);
+    }
     let rect = base.crop;
     let identity = Identity {
         version: env!("CARGO_PKG_VERSION").into(),
@@ -125,6 +137,7 @@ pub(super) fn plan(args: &ConvergeArgs, warnings: &mut Vec<String>) -> Result<Pl
         reference: reference_identity,
         threads: args.threads.map_or(0, usize::from),
         gpu: backends.gpu,
+        kernels,
     };
     let shown = preset.map_or(&[][..], |p| p.shown).iter().copied();
     Ok(Plan {
