@@ -23,7 +23,7 @@ use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{CommandFactory as _, Parser, Subcommand};
 
 use crate::effects::Effects;
-use crate::error::{Error, Result};
+use crate::error::{Action, Error, Result};
 use crate::media::MAX_LEVELS;
 use crate::placement::{Placement, Side};
 use crate::scene::Scene;
@@ -140,15 +140,12 @@ pub fn main() -> u8 {
     match run(cli) {
         Ok(()) => 0,
         Err(error) => {
-            let text = error.to_string();
             if !matches!(error, Error::Interrupted(_)) {
-                // Scene errors come with their own heading.
-                let heading = if text.starts_with("error") {
-                    ""
-                } else {
-                    "error: "
+                let heading = match error {
+                    Error::Scene(_) => "",
+                    _ => "error: ",
                 };
-                let _ = writeln!(std::io::stderr(), "{heading}{text}");
+                let _ = writeln!(std::io::stderr(), "{heading}{error}");
             }
             error.exit_code()
         }
@@ -205,7 +202,7 @@ fn misplaced_word(error: &clap::Error) -> Option<String> {
 fn derive(scene: &Scene, settings: &Settings) -> Result<(Placement, Effects)> {
     let placement = Placement::with_offset(scene, settings.width, settings.height, settings.offset);
     if placement.media.levels > MAX_LEVELS {
-        return Err(Error::Scene(format!(
+        return Err(Error::Placement(format!(
             "dielectrics that touch, nest or overlap need {} levels of priority, more than \
              {MAX_LEVELS}",
             placement.media.levels
@@ -221,7 +218,7 @@ fn derive(scene: &Scene, settings: &Settings) -> Result<(Placement, Effects)> {
 /// one of radius 1e-20 has no size left.
 fn check_magnitudes(placement: &Placement) -> Result<()> {
     let refuse = |what: &str| {
-        Err(Error::Scene(format!(
+        Err(Error::Placement(format!(
             "{what} in units of the whole scene is a number that the device cannot hold: the \
              scene's lengths lie too many orders of magnitude apart"
         )))
@@ -242,7 +239,7 @@ fn check_magnitudes(placement: &Placement) -> Result<()> {
         return refuse("the distance of --offset");
     }
     if !placement.light.is_finite() {
-        return Err(Error::Scene(
+        return Err(Error::Placement(
             "the brightest light of the scene is too dark to compute with".into(),
         ));
     }
@@ -270,7 +267,7 @@ fn check_lens(scene: &Scene, placement: &Placement) -> Result<()> {
         .find(|s| s.side == Side::Sign && scene.materials[s.material].kind.transmits());
     match straddled {
         None => Ok(()),
-        Some(sphere) => Err(Error::Scene(format!(
+        Some(sphere) => Err(Error::Placement(format!(
             "the lens lies on both sides of sphere {}, a dielectric, in a scene where dielectrics \
              share points: make `aperture_radius` smaller, or move the camera",
             sphere.source + 1
@@ -286,7 +283,7 @@ fn print(text: &str) -> Result<()> {
         .and_then(|()| stdout.flush())
     {
         Err(source) if source.kind() != std::io::ErrorKind::BrokenPipe => Err(Error::File {
-            action: "cannot write",
+            action: Action::Write,
             path: PathBuf::from("stdout"),
             source,
         }),

@@ -89,7 +89,7 @@ impl Uploads {
             .map(|(_, name, bytes)| (*name, bytes.len() as u64));
         for (name, size) in sizes.chain([("partial sums", partials)]) {
             if size > most {
-                return Err(Error::Gpu(format!(
+                return Err(Error::DeviceLimit(format!(
                     "the {name} need {size} bytes, more than the device's limit of {most} for one \
                      buffer; --backend cpu has no such limit"
                 )));

@@ -13,7 +13,7 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
-use crate::error::{Error, Result};
+use crate::error::{Action, Error, Result};
 use crate::image::{Format, Picture};
 
 /// An image and what its file says about it.
@@ -84,7 +84,7 @@ pub fn read(path: &Path) -> Result<Input> {
             ..input
         })
         .map_err(|source| Error::File {
-            action: "cannot read",
+            action: Action::Read,
             path: path.to_path_buf(),
             source,
         })

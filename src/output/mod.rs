@@ -24,7 +24,7 @@ pub use target::{Target, check_all};
 
 use std::io;
 
-use crate::error::{Error, Result};
+use crate::error::{Action, Error, Result};
 use crate::image::{Format, Picture};
 
 /// Everything that an image file can say about a render. Each format takes what it can hold.
@@ -76,7 +76,7 @@ pub fn write_all(targets: &[Target], contents: &Contents<'_>) -> Result<()> {
         source = io::Error::new(source.kind(), text);
     }
     Err(Error::File {
-        action: "cannot write",
+        action: Action::Write,
         path: first.path.clone(),
         source,
     })

@@ -11,7 +11,7 @@ use super::run::Run;
 use super::store::{FILES, Store};
 use super::summary::{Level, Summary};
 use super::tables;
-use crate::error::{Error, Result};
+use crate::error::{Action, Error, Result};
 use crate::numbers::{percent, significant};
 use crate::variance::VarianceClass;
 
@@ -45,7 +45,7 @@ pub fn write(study: &Study, store: &Store, outcome: &Outcome, warnings: &[String
     let report = report(study, store, outcome, &pairs, &plots, warnings)?;
     let [time, spp] = &plots;
     let csv = csv(analysis, &runs, outcome.noise).map_err(|source| Error::File {
-        action: "cannot write",
+        action: Action::Write,
         path: store.path(FILES[0]),
         source,
     })?;
@@ -192,7 +192,7 @@ fn report(
         command: study.command.clone(),
     };
     report.html().map_err(|source| Error::File {
-        action: "cannot write",
+        action: Action::Write,
         path: store.path("report.html"),
         source,
     })

@@ -6,7 +6,7 @@ use super::run::advance;
 use super::series::Series;
 use super::store::{REFERENCE, Store};
 use super::timetable::{Part, Timetable};
-use crate::error::{Error, Result};
+use crate::error::{Action, Error, Result};
 use crate::film::Film;
 use crate::image::exr::{RGB, STDERR};
 use crate::image::{Format, Picture};
@@ -53,7 +53,7 @@ pub(super) fn reference(
         .with("scene", study.loaded.name.as_str())
         .with("device", opened.renderer.device().0);
     let bytes = encode(&film, metadata).map_err(|source| Error::File {
-        action: "cannot write",
+        action: Action::Write,
         path: path.clone(),
         source,
     })?;

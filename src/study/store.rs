@@ -12,7 +12,7 @@ use serde_json::Value;
 
 use super::identity::{Identity, ReferenceIdentity};
 use super::run::Run;
-use crate::error::{Error, Result};
+use crate::error::{Action, Error, Result};
 use crate::film::Film;
 use crate::image::Picture;
 use crate::input::read;
@@ -66,7 +66,7 @@ impl Store {
                 store.check_unused()?;
                 store.begin(identity)
             }
-            Err(source) => Err(file("cannot read", &runs, source)),
+            Err(source) => Err(file(Action::Read, &runs, source)),
         }
     }
 
@@ -146,7 +146,7 @@ impl Store {
 
     fn make_images(&self) -> Result<()> {
         let images = self.path(IMAGES);
-        fs::create_dir_all(&images).map_err(|source| file("cannot write", &images, source))
+        fs::create_dir_all(&images).map_err(|source| file(Action::Write, &images, source))
     }
 
     /// Removes what an older study wrote, and nothing else.
@@ -162,7 +162,7 @@ impl Store {
             old.push(reference);
         }
         let images = self.path(IMAGES);
-        let unreadable = |source| file("cannot read", &images, source);
+        let unreadable = |source| file(Action::Read, &images, source);
         match fs::read_dir(&images) {
             Ok(entries) => {
                 for entry in entries {
@@ -179,7 +179,7 @@ impl Store {
         for path in old {
             match fs::remove_file(&path) {
                 Err(error) if error.kind() != io::ErrorKind::NotFound => {
-                    return Err(file("cannot remove", &path, error));
+                    return Err(file(Action::Remove, &path, error));
                 }
                 _ => {}
             }
@@ -232,7 +232,7 @@ impl Store {
             .append(true)
             .open(&path)
             .and_then(|mut file: File| file.write_all(format!("{line}\n").as_bytes()));
-        appended.map_err(|source| file("cannot write", &path, source))
+        appended.map_err(|source| file(Action::Write, &path, source))
     }
 }
 
@@ -252,7 +252,7 @@ fn image_path(name: &str) -> String {
     format!("{IMAGES}/{name}.npy")
 }
 
-fn file(action: &'static str, path: &Path, source: io::Error) -> Error {
+fn file(action: Action, path: &Path, source: io::Error) -> Error {
     Error::File {
         action,
         path: path.to_owned(),

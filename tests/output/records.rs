@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use gpu_trace::error::Error;
+use gpu_trace::error::{Action, Error};
 use gpu_trace::output::{Progress, ProgressMode, Snapshot, Stats, stats};
 use tempfile::TempDir;
 
@@ -120,7 +120,7 @@ fn statistics_are_valid_json() {
     assert!(matches!(
         error,
         Err(Error::File {
-            action: "cannot write",
+            action: Action::Write,
             ..
         })
     ));

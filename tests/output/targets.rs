@@ -4,7 +4,7 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use gpu_trace::error::Error;
+use gpu_trace::error::{Action, Error};
 use gpu_trace::image::Format;
 use gpu_trace::output::{Metadata, Target, atomic, check_all, write_all};
 use tempfile::TempDir;
@@ -136,7 +136,7 @@ fn one_failure_does_not_stop_the_others() {
     let Error::File { action, path, .. } = &error else {
         panic!("{error:?}")
     };
-    assert_eq!((*action, path), ("cannot write", &targets[0].path));
+    assert_eq!((*action, path), (Action::Write, &targets[0].path));
     let text = error.to_string();
     assert!(
         text.contains("a.png") && text.contains("c.exr") && !text.contains("b.npy"),
@@ -232,7 +232,7 @@ mod unix {
             else {
                 panic!("{error:?}")
             };
-            assert_eq!((*action, named), ("cannot write", &path));
+            assert_eq!((*action, named), (Action::Write, &path));
             assert!(!error.to_string().contains(".gpu-trace-"), "{error}");
             return;
         }

@@ -70,6 +70,7 @@ fn failed(failure: Error, directory: PathBuf) -> Error {
     );
     match failure {
         Error::Gpu(text) => Error::Gpu(format!("{text}; {kept}")),
+        Error::DeviceLimit(text) => Error::DeviceLimit(format!("{text}; {kept}")),
         Error::NonFinite(text) => Error::NonFinite(format!("{text}; {kept}")),
         other => other,
     }

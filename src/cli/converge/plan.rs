@@ -11,7 +11,7 @@ use crate::backend::{Backend, LEAST_PIXEL_BYTES, check_memory};
 use crate::cli::args::{BackendArg, IntegratorArg, SamplerArg};
 use crate::cli::derive;
 use crate::cli::device::open;
-use crate::error::{Error, Result};
+use crate::error::{Action, Error, Result};
 use crate::image::Format;
 use crate::input::{Input, read};
 use crate::sampler::Sampler;
@@ -403,7 +403,7 @@ fn reference_file(
         )));
     }
     let bytes = fs::read(path).map_err(|source| Error::File {
-        action: "cannot read",
+        action: Action::Read,
         path: path.to_owned(),
         source,
     })?;
