@@ -2,12 +2,12 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::aov::AovSums;
 use crate::error::{Error, Result};
+use crate::film::AovSums;
 use crate::gpu::device::{self, DRIVER_ADVICE, DeviceChoice, Gpu};
 use crate::gpu::renderer::GpuRenderer;
 use crate::job::Job;
-use crate::output::numbers::significant;
+use crate::numbers::significant;
 use crate::reference::renderer::ReferenceRenderer;
 use crate::render::Renderer;
 use crate::settings::{Rect, Settings};

@@ -1,8 +1,8 @@
 //! What an estimator claims of the numbers that it makes. The error bars that are given follow from it,
 //! and so do the tests: `tests/claims.rs` holds every estimator to all that it claims.
 
-use crate::estimate::VarianceClass;
 use crate::settings::{Offset, Settings};
+use crate::variance::VarianceClass;
 
 /// What holds of a render with some settings; `false` promises nothing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,23 +1,27 @@
 //! What can go wrong, and the exit code of each.
 
+use std::fmt;
 use std::path::PathBuf;
 
 /// Every error of the program. The message is complete: it names the file, the option or the
 /// device, and says what to do where that is known.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// A scene that cannot be used. The text holds file, line, column, and the line itself with the
-    /// place underlined.
+    /// A scene file that cannot be used. The text holds file, line, column, and the line itself with the
+    /// place underlined, under a heading of its own.
     #[error("{0}")]
     Scene(String),
+    /// A scene that is well formed, but that the kernel cannot hold.
+    #[error("{0}")]
+    Placement(String),
     /// An option or a combination of options that cannot be used.
     #[error("{0}")]
     Usage(String),
     /// A file that cannot be read or written.
     #[error("{action} {}: {source}", path.display())]
     File {
-        /// What was tried, as in "cannot write".
-        action: &'static str,
+        /// What was tried.
+        action: Action,
         /// The file.
         path: PathBuf,
         /// The system's reason.
@@ -29,6 +33,9 @@ pub enum Error {
     /// The device failed while it worked: lost, out of memory, or a validation error.
     #[error("{0}")]
     Gpu(String),
+    /// A buffer is beyond a limit of the device.
+    #[error("{0}")]
+    DeviceLimit(String),
     /// The kernel could not be linked or validated: a defect of this program.
     #[error("{0}")]
     Shader(String),
@@ -43,6 +50,28 @@ pub enum Error {
     Interrupted(i32),
 }
 
+/// What is done to a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Action {
+    /// It is read.
+    Read,
+    /// It is written.
+    Write,
+    /// It is removed.
+    Remove,
+}
+
+/// As messages say that it failed.
+impl fmt::Display for Action {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(match self {
+            Self::Read => "cannot read",
+            Self::Write => "cannot write",
+            Self::Remove => "cannot remove",
+        })
+    }
+}
+
 impl Error {
     /// The exit code of the process: 2 for what the user can correct in the input, 129, 130 or 143
     /// after a signal, 3 if a check failed, else 1.
@@ -50,9 +79,10 @@ impl Error {
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Scene(_)
+            | Self::Placement(_)
             | Self::Usage(_)
             | Self::File {
-                action: "cannot read",
+                action: Action::Read,
                 ..
             } => 2,
             Self::Check(_) => 3,

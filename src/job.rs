@@ -4,15 +4,15 @@
 //! compared that a check refuses. What only a device or the memory can tell is left to the
 //! [backend](crate::backend).
 
-use crate::allocation::PILOT_SAMPLES;
 use crate::claims::Claims;
 use crate::effects::{BAKED_MOST, Effect, Effects};
 use crate::error::{Error, Result};
-use crate::estimate::{VarianceReport, variance_class};
+use crate::film::PILOT_SAMPLES;
 use crate::placement::media::MAX_LEVELS;
 use crate::placement::{Placement, Side};
 use crate::scene::{MAX_BOUNCES, MAX_SIDE, MAX_SPP, Scene};
 use crate::settings::{GeometryChoice, Integrator, Offset, Settings, TERMINATIONS};
+use crate::variance::{VarianceReport, variance_class};
 
 /// What will be rendered: it has passed all checks.
 #[derive(Clone, Debug)]
@@ -29,7 +29,7 @@ pub struct Job {
 ///
 /// # Errors
 /// [`Error::Usage`] where settings are out of range or contradict each other or the scene;
-/// [`Error::Scene`] for a scene that the kernel cannot render in this way.
+/// [`Error::Placement`] for a scene that the kernel cannot render in this way.
 pub fn prepare(scene: &Scene, settings: &Settings) -> Result<Job> {
     check_image(settings)?;
     check_samples(settings)?;
@@ -184,7 +184,7 @@ fn check_geometry(scene: &Scene, settings: &Settings) -> Result<()> {
 
 fn check_levels(placement: &Placement) -> Result<()> {
     if placement.media.levels > MAX_LEVELS {
-        return Err(Error::Scene(format!(
+        return Err(Error::Placement(format!(
             "dielectrics that touch, nest or overlap need {} levels of priority, more than \
              {MAX_LEVELS}",
             placement.media.levels
@@ -197,7 +197,7 @@ fn check_levels(placement: &Placement) -> Result<()> {
 /// one of radius 1e-20 has no size left.
 fn check_magnitudes(placement: &Placement) -> Result<()> {
     let refuse = |what: &str| {
-        Err(Error::Scene(format!(
+        Err(Error::Placement(format!(
             "{what} in units of the whole scene is a number that the device cannot hold: the \
              scene's lengths lie too many orders of magnitude apart"
         )))
@@ -218,7 +218,7 @@ fn check_magnitudes(placement: &Placement) -> Result<()> {
         return refuse("the distance of --offset");
     }
     if !placement.light.is_finite() {
-        return Err(Error::Scene(
+        return Err(Error::Placement(
             "the brightest light of the scene is too dark to compute with".into(),
         ));
     }
@@ -246,7 +246,7 @@ fn check_lens(scene: &Scene, placement: &Placement) -> Result<()> {
         .find(|s| s.side == Side::Sign && scene.materials[s.material].kind.transmits());
     match straddled {
         None => Ok(()),
-        Some(sphere) => Err(Error::Scene(format!(
+        Some(sphere) => Err(Error::Placement(format!(
             "the lens lies on both sides of sphere {}, a dielectric, in a scene where dielectrics \
              share points: make `aperture_radius` smaller, or move the camera",
             sphere.source + 1

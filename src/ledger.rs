@@ -117,7 +117,7 @@ pub fn audit(
                 Some(without) => (difference(&with, &without), None),
                 None => return Ok(None),
             },
-            Err(Error::Scene(why)) => ((f64::NAN, f64::NAN), Some(why)),
+            Err(Error::Placement(why)) => ((f64::NAN, f64::NAN), Some(why)),
             Err(other) => return Err(other),
         };
         entries.push(Entry {

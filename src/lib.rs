@@ -14,19 +14,17 @@
 //! 7. [`gpu`] and [`reference`](mod@reference): two renderers, wgpu in f32 and the CPU in f64, that
 //!    trace the same paths. [`backend`]: one of them, opened.
 //! 8. [`render`]: the loop that asks a renderer for windows of samples until a stop rule holds.
-//! 9. [`film`]: f64 sums and variances over all windows. [`aov`]: what it can hold beside the image.
-//! 10. [`estimate`], [`intervals`] and [`allocation`]: mean and error; where further samples go.
-//!     [`forecast`]: what an error will cost, from a pilot. [`ledger`]: how much light inexact settings
+//! 9. [`film`]: f64 sums and variances over all windows; mean and error; where further samples go.
+//!    [`variance`]: whether samples can show their variance.
+//! 10. [`forecast`]: what an error will cost, from a pilot. [`ledger`]: how much light inexact settings
 //!     took.
-//! 11. [`output`]: images, statistics, progress.
+//! 11. [`image`](mod@image): what is written and read. [`output`]: images, statistics, progress.
 //! 12. [`input`] and [`compare`](mod@compare): images of any origin, and how far two are apart.
 //!
 //! [`study`] measures what accuracy costs in time.
 //! [`check`] measures the hard cases of all this on a device, with the tests of [`statistics`].
-//! [`error`] is what can go wrong anywhere.
+//! [`numbers`] is how people read them. [`error`] is what can go wrong anywhere.
 
-pub mod allocation;
-pub mod aov;
 pub mod backend;
 pub mod check;
 pub mod claims;
@@ -34,15 +32,15 @@ pub mod cli;
 pub mod compare;
 pub mod effects;
 pub mod error;
-pub mod estimate;
 pub mod film;
 pub mod forecast;
 pub mod gpu;
+pub mod image;
 pub mod input;
-pub mod intervals;
 pub mod job;
 pub mod ledger;
 pub mod materials;
+pub mod numbers;
 pub mod output;
 pub mod placement;
 pub mod reference;
@@ -53,3 +51,4 @@ pub mod settings;
 pub mod shader;
 pub mod statistics;
 pub mod study;
+pub mod variance;

@@ -3,10 +3,11 @@
 use std::ops::Range;
 use std::time::{Duration, Instant};
 
-use crate::allocation::{Allocation, PILOT_SAMPLES, Tiles};
 use crate::error::Result;
-use crate::estimate::Estimate;
-use crate::film::{BLOCK, Film, LEAST_SAMPLES, Window, next_look, window_end};
+use crate::film::{
+    Allocation, BLOCK, Estimate, Film, LEAST_SAMPLES, PILOT_SAMPLES, Tiles, Window, next_look,
+    window_end,
+};
 use crate::job::Job;
 use crate::sampler::PILOT;
 use crate::settings::{Rect, Settings};

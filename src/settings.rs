@@ -49,7 +49,7 @@ pub struct Settings {
     pub offset: Offset,
     /// Whether a pilot decides where samples go; `samples` are then those a pixel on average, with it.
     pub adaptive: bool,
-    /// Keep the light of each [kind of path](crate::aov::LightClass) by itself.
+    /// Keep the light of each [kind of path](crate::film::LightClass) by itself.
     pub classes: bool,
     /// Keep normal, albedo and depth of what is seen first.
     pub features: bool,

@@ -7,9 +7,9 @@ use std::collections::BTreeSet;
 use common::{
     cpu_renderer, gpu_renderer, image_bits, render_cpu, render_gpu, scene, scene_file, settings,
 };
-use gpu_trace::allocation::{Allocation, PILOT_SAMPLES};
-use gpu_trace::estimate::Estimate;
-use gpu_trace::film::{Film, PixelSums, Tally, Window, next_look, window_end};
+use gpu_trace::film::{
+    Allocation, Estimate, Film, PILOT_SAMPLES, PixelSums, Tally, Window, next_look, window_end,
+};
 use gpu_trace::gpu::renderer::{DispatchLimits, GpuRenderer};
 use gpu_trace::render::{Control, Renderer as _, render_quietly};
 use gpu_trace::scene::Scene;

@@ -5,8 +5,7 @@ mod common;
 
 use cli_support::{Folder, holds};
 use common::{render_cpu, render_gpu, scene, scene_file, settings};
-use gpu_trace::aov::LightClass;
-use gpu_trace::film::Film;
+use gpu_trace::film::{Film, LightClass};
 use gpu_trace::scene::Scene;
 use gpu_trace::settings::{Integrator, Settings};
 
@@ -215,7 +214,7 @@ fn both_renderers_have_the_same_layers() {
                 cpu.aovs(i).expect("asked for"),
             );
             let near = |a: f64, b: f64| (a - b).abs() <= 1.0e-3 * (a.abs() + b.abs() + 1.0e-2);
-            let numbers = |s: &gpu_trace::aov::AovSums| {
+            let numbers = |s: &gpu_trace::film::AovSums| {
                 let mut all = s.classes.as_flattened().to_vec();
                 all.extend(
                     s.normal

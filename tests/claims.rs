@@ -5,7 +5,6 @@ mod common;
 
 use common::{gpu_renderer, image_bits, job, scene, scene_file, settings};
 use gpu_trace::error::Result;
-use gpu_trace::estimate::VarianceClass;
 use gpu_trace::film::{Film, window_end};
 use gpu_trace::gpu::renderer::{DispatchLimits, GpuRenderer};
 use gpu_trace::render::{Control, Renderer as _, Status, Watch, render, render_quietly};
@@ -13,6 +12,7 @@ use gpu_trace::sampler::Sampler;
 use gpu_trace::scene::Scene;
 use gpu_trace::settings::{Integrator, LightSampling, Offset, Rect, Settings};
 use gpu_trace::statistics::{mean_and_error, normal_limit};
+use gpu_trace::variance::VarianceClass;
 
 /// Samples a pixel: with batches of all lengths.
 const SPP: u64 = 512;

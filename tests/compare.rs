@@ -4,8 +4,9 @@ mod cli_support;
 
 use cli_support::{Folder, holds};
 use gpu_trace::compare::{HeatMap, Options, Report, Seen, compare, flip, heat_colour, ssim};
-use gpu_trace::input::{Input, decode, linear};
-use gpu_trace::output::{Layer, Metadata, Picture, exr, npy, png};
+use gpu_trace::image::{Picture, linear};
+use gpu_trace::input::{Input, decode};
+use gpu_trace::output::{Layer, Metadata, exr, npy, png};
 use gpu_trace::statistics::student_quantile;
 use serde_json::Value;
 

@@ -18,7 +18,9 @@ use cli_support::{Background, Folder, Run, bits, holds};
 use gpu_trace::check::Random;
 use gpu_trace::error::Error;
 use gpu_trace::gpu::renderer::GpuRenderer;
-use gpu_trace::output::{Contents, Format, Metadata, Picture, atomic, npy, read_npy};
+use gpu_trace::image::{Format, Picture};
+use gpu_trace::input::{self, decode};
+use gpu_trace::output::{Contents, Metadata, atomic, npy};
 use gpu_trace::scene::load::{load_file, load_str};
 use gpu_trace::settings::GeometryChoice;
 use serde_json::json;
@@ -655,7 +657,7 @@ fn a_damaged_npy_is_refused_or_read_as_it_is() {
     let folder = Folder::new();
     let read = |bytes: &[u8]| {
         folder.write("a.npy", bytes);
-        read_npy(&folder.path("a.npy"))
+        input::read(&folder.path("a.npy")).map(|input| input.picture)
     };
     assert_eq!(read(&whole).expect("it is whole"), picture);
     for length in 0..whole.len() {
@@ -671,7 +673,11 @@ fn a_damaged_npy_is_refused_or_read_as_it_is() {
     for bit in 0..8 * whole.len() {
         let mut bytes = whole.clone();
         bytes[bit / 8] ^= 1 << (bit % 8);
-        match npy::decode(&bytes[..]) {
+        // Another byte order is another array, and as good.
+        if bytes[..data].windows(3).any(|w| w == b">f4") {
+            continue;
+        }
+        match decode(&bytes).map(|input| input.picture) {
             // One value has one bit changed.
             Ok(damaged) if bit / 8 >= data => {
                 assert_eq!(npy::encode(&damaged), bytes, "bit {bit}");

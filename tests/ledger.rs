@@ -4,7 +4,7 @@ mod common;
 
 use common::{gpu, job, render_gpu, scene, scene_file, settings};
 use gpu_trace::backend::Backend;
-use gpu_trace::estimate::Estimate;
+use gpu_trace::film::Estimate;
 use gpu_trace::job::prepare;
 use gpu_trace::ledger::{Entry, audit};
 use gpu_trace::scene::Scene;

@@ -11,10 +11,9 @@ use std::time::Duration;
 use common::{
     gpu_renderer, job, means, render_cpu, render_gpu, scene, scene_file, scene_files, settings,
 };
-use gpu_trace::allocation::Tiles;
 use gpu_trace::effects::Effects;
 use gpu_trace::error::{Error, Result};
-use gpu_trace::film::{Film, PixelSums, Tally, Window};
+use gpu_trace::film::{Film, PixelSums, Tally, Tiles, Window};
 use gpu_trace::gpu::device::STORAGE_BUFFERS;
 use gpu_trace::gpu::renderer::DispatchLimits;
 use gpu_trace::placement::Placement;

@@ -10,7 +10,8 @@ mod common;
 use std::path::Path;
 
 use gpu_trace::film::Film;
-use gpu_trace::output::{Picture, read_npy};
+use gpu_trace::image::Picture;
+use gpu_trace::input::read;
 use gpu_trace::scene::{MaterialKind, Scene};
 
 /// Samples a pixel.
@@ -38,7 +39,8 @@ fn folder() -> std::path::PathBuf {
 }
 
 fn reference(name: &str, part: &str) -> Picture {
-    read_npy(&folder().join(format!("{name}.{part}.npy"))).unwrap_or_else(|e| panic!("{e}"))
+    let file = folder().join(format!("{name}.{part}.npy"));
+    read(&file).unwrap_or_else(|e| panic!("{e}")).picture
 }
 
 fn compare(name: &str, film: &Film) -> Verdict {

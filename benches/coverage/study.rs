@@ -1,10 +1,8 @@
 //! How often intervals hold the truth: renders of many seeds against what all others agree on.
 
-use gpu_trace::estimate::Estimate;
-use gpu_trace::film::{Film, next_look, window_end};
+use gpu_trace::film::{Estimate, Film, half_widths, next_look, window_end};
 use gpu_trace::gpu::device::Gpu;
 use gpu_trace::gpu::renderer::GpuRenderer;
-use gpu_trace::intervals::half_widths;
 use gpu_trace::job::prepare;
 use gpu_trace::render::{Control, Renderer as _};
 use gpu_trace::scene::Scene;

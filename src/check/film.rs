@@ -422,7 +422,7 @@ fn refusals(context: &Context, scene: &Scene, measure: &mut Measure) -> Result<(
         "[camera]\nposition = [0, 0, 4]\nlook_at = [0, 0, 0]\nfov = 36.0\n\
          [image]\nwidth = {side}\nheight = 1\n"
     ));
-    let refused = matches!(&too_wide, Err(Error::Scene(text)) if text.contains("65536"));
+    let refused = matches!(&too_wide, Err(Error::Scene(_)));
     measure.count(1, u64::from(!refused), || {
         format!("an image {side} pixels wide is no error")
     });
@@ -430,10 +430,7 @@ fn refusals(context: &Context, scene: &Scene, measure: &mut Measure) -> Result<(
     let mut gpu = context.gpu.clone();
     gpu.limits.max_buffer_size = 1 << 12;
     let settings = sized(context, scene, [64, 64], 1);
-    let refused = matches!(
-        renderer(gpu, scene, &settings),
-        Err(Error::Gpu(text)) if text.contains("limit of 4096")
-    );
+    let refused = matches!(renderer(gpu, scene, &settings), Err(Error::DeviceLimit(_)));
     measure.count(1, u64::from(!refused), || {
         "buffers beyond the device's limit are no error".into()
     });

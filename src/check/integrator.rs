@@ -4,13 +4,13 @@ use super::context::{Context, SceneText, means};
 use super::film::must;
 use super::{Case, Measure, Run};
 use crate::error::Result;
-use crate::estimate::VarianceClass;
 use crate::film::{BLOCK, Film};
 use crate::job::prepare;
 use crate::sampler::Sampler;
 use crate::scene::Scene;
 use crate::settings::{Integrator, Settings};
 use crate::statistics::mean_and_error;
+use crate::variance::VarianceClass;
 
 pub(super) const CASES: &[Case] = &[
     Case {

@@ -4,9 +4,8 @@
 use std::ops::Range;
 use std::str::FromStr;
 
-use crate::allocation::Tiles;
 use crate::error::{Error, Result};
-use crate::film::{NonFinite, Window};
+use crate::film::{NonFinite, Tiles, Window};
 use crate::gpu::device::Gpu;
 use crate::render::{Control, Renderer};
 use crate::settings::Rect;

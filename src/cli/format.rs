@@ -1,3 +1,3 @@
 //! Numbers as people read them.
 
-pub(super) use crate::output::numbers::{duration, percent, significant};
+pub(super) use crate::numbers::{duration, percent, significant};

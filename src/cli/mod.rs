@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{CommandFactory as _, Parser, Subcommand};
 
-use crate::error::{Error, Result};
+use crate::error::{Action, Error, Result};
 
 pub use args::RenderArgs;
 
@@ -135,15 +135,12 @@ pub fn main() -> u8 {
     match run(cli) {
         Ok(()) => 0,
         Err(error) => {
-            let text = error.to_string();
             if !matches!(error, Error::Interrupted(_)) {
-                // Scene errors come with their own heading.
-                let heading = if text.starts_with("error") {
-                    ""
-                } else {
-                    "error: "
+                let heading = match error {
+                    Error::Scene(_) => "",
+                    _ => "error: ",
                 };
-                let _ = writeln!(std::io::stderr(), "{heading}{text}");
+                let _ = writeln!(std::io::stderr(), "{heading}{error}");
             }
             error.exit_code()
         }
@@ -204,7 +201,7 @@ fn print(text: &str) -> Result<()> {
         .and_then(|()| stdout.flush())
     {
         Err(source) if source.kind() != std::io::ErrorKind::BrokenPipe => Err(Error::File {
-            action: "cannot write",
+            action: Action::Write,
             path: PathBuf::from("stdout"),
             source,
         }),

@@ -19,7 +19,7 @@ pub(super) fn check(scene: &str) -> Result<()> {
 /// Runs `scene schema`.
 pub(super) fn schema() -> Result<()> {
     let text = serde_json::to_string_pretty(&crate::scene::json_schema())
-        .map_err(|e| Error::Scene(format!("cannot write the schema: {e}")))?;
+        .map_err(|e| Error::Usage(format!("cannot write the schema: {e}")))?;
     print(&(text + "\n"))
 }
 

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::is_finite;
-use crate::output::Picture;
+use crate::image::Picture;
 
 /// The share of the reference's mean below which errors are no longer relative to the pixel: noise
 /// in the dark would else outweigh all that is seen. The same as in the error that a render

@@ -3,7 +3,8 @@
 use std::io;
 
 use super::error;
-use crate::output::{Contents, Format, Metadata, Picture};
+use crate::image::{Format, Picture, linear};
+use crate::output::{Contents, Metadata};
 
 /// Seventeenths of the colour map "magma" by N. Smith and S. van der Walt (CC0), whose steps look
 /// equally large; between them it is linear, off by at most 2 of 255 levels.
@@ -73,7 +74,7 @@ impl HeatMap {
             false => colour(error / self.range),
         };
         // The encoder takes linear values and gives these levels back.
-        let level = |level: u8| crate::input::linear(f64::from(level) / 255.0) as f32;
+        let level = |level: u8| linear(f64::from(level) / 255.0) as f32;
         let pixels: Vec<[f32; 3]> = self.errors.iter().map(|e| colour(e).map(level)).collect();
         let height = (pixels.len() / self.width as usize) as u32;
         let contents = Contents {

@@ -19,9 +19,8 @@ pub use ssim::ssim;
 pub use ztest::{Known, ZTest, ztest};
 
 use crate::error::{Error, Result};
+use crate::image::{Picture, srgb};
 use crate::input::Input;
-use crate::output::Picture;
-use crate::output::png::srgb;
 
 /// What the measures of seen differences take for granted.
 #[derive(Clone, Copy, Debug)]

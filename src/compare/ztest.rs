@@ -3,8 +3,8 @@
 use serde::Serialize;
 
 use super::is_finite;
+use crate::image::Picture;
 use crate::input::Input;
-use crate::output::Picture;
 use crate::statistics::{as_normal, normal_limit};
 
 /// What a value can be off by without any noise, relative: rounding in f32 and in the device's

@@ -1,8 +1,7 @@
 //! Variances of the whole image from those of its parts.
 
 use super::Measured;
-use crate::estimate::UPPER;
-use crate::film::Window;
+use crate::film::{UPPER, Window};
 use crate::settings::Rect;
 
 /// What few samples of the whole image show: coarse, but everywhere.

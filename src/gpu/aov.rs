@@ -1,6 +1,6 @@
 //! Reads the sums for layers beside the image out of the kernel's `Partial`s.
 
-use crate::aov::AovSums;
+use crate::film::AovSums;
 use crate::placement::Placement;
 use crate::settings::Rect;
 use crate::shader::Kernel;

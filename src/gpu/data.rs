@@ -17,7 +17,7 @@ pub(super) const SCENE: &str = "scene";
 /// Whether the device takes the scene's data, and `partials` bytes of partial sums.
 ///
 /// # Errors
-/// [`Error::Gpu`] if one of these is too large for it.
+/// [`Error::DeviceLimit`] if one of these is too large for it.
 pub(super) fn check(limits: &wgpu::Limits, kernel: &Kernel, partials: u64) -> Result<()> {
     let most = limits
         .max_storage_buffer_binding_size
@@ -26,7 +26,7 @@ pub(super) fn check(limits: &wgpu::Limits, kernel: &Kernel, partials: u64) -> Re
     let data = data.map_or(0, |(_, size)| u64::from(size));
     for (name, size) in [("scene's data", data), ("partial sums", partials)] {
         if size > most {
-            return Err(Error::Gpu(format!(
+            return Err(Error::DeviceLimit(format!(
                 "the {name} need {size} bytes, more than the device's limit of {most} for one \
                  buffer; --backend cpu has no such limit"
             )));

@@ -1,5 +1,6 @@
 //! Adapters and devices: finding, choosing, opening, and noticing when one fails.
 
+use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crate::error::{Error, Result};
@@ -250,34 +251,49 @@ pub fn open(choice: &DeviceChoice) -> Result<Gpu> {
 
 /// What a device has reported, in order.
 #[derive(Clone, Debug, Default)]
-struct Faults(Arc<Mutex<Vec<String>>>);
+struct Faults(Arc<Mutex<Vec<Fault>>>);
 
-const OUT_OF_MEMORY: &str = "the device is out of memory";
+#[derive(Debug, PartialEq, Eq)]
+enum Fault {
+    OutOfMemory,
+    /// What the device says.
+    Reported(String),
+    /// The reason, where there is one.
+    Lost(String),
+}
+
+impl fmt::Display for Fault {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::OutOfMemory => formatter.write_str("the device is out of memory"),
+            Self::Reported(text) => write!(formatter, "the device reports: {text}"),
+            // A device that was destroyed gives no reason.
+            Self::Lost(reason) if reason.is_empty() => formatter.write_str("the device is lost"),
+            Self::Lost(reason) => write!(formatter, "the device is lost: {reason}"),
+        }
+    }
+}
 
 impl Faults {
-    fn list(&self) -> MutexGuard<'_, Vec<String>> {
+    fn list(&self) -> MutexGuard<'_, Vec<Fault>> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn report(&self, error: &wgpu::Error) {
         let mut list = self.list();
         // What has no memory is invalid from then on, which every use of it would report again.
-        if list.last().is_some_and(|last| last == OUT_OF_MEMORY) {
+        if list.last() == Some(&Fault::OutOfMemory) {
             return;
         }
         list.push(match error {
-            wgpu::Error::OutOfMemory { .. } => OUT_OF_MEMORY.to_owned(),
-            other => format!("the device reports: {other}"),
+            wgpu::Error::OutOfMemory { .. } => Fault::OutOfMemory,
+            other => Fault::Reported(other.to_string()),
         });
     }
 
     fn lost(&self, message: &str) {
-        // A device that was destroyed gives no reason.
-        let reason = match message.trim_end_matches('.') {
-            "" => String::new(),
-            reason => format!(": {reason}"),
-        };
-        self.list().push(format!("the device is lost{reason}"));
+        let reason = message.trim_end_matches('.').to_owned();
+        self.list().push(Fault::Lost(reason));
     }
 }
 
@@ -310,6 +326,7 @@ impl Gpu {
         if faults.is_empty() {
             return Ok(());
         }
+        let faults: Vec<String> = faults.iter().map(Fault::to_string).collect();
         Err(Error::Gpu(format!(
             "{}: {}",
             self.summary.name,

@@ -7,8 +7,8 @@
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 
-use crate::allocation::{TILE, Tiles};
 use crate::effects::{Effect, Effects};
+use crate::film::{TILE, Tiles};
 use crate::materials::{Member, MemberValue, forms};
 use crate::placement::{Light, PlacedCamera, PlacedSphere, Placement};
 use crate::scene::Material;

@@ -3,8 +3,8 @@
 use std::ops::Range;
 use std::time::Duration;
 
-use crate::allocation::TILE;
 use crate::film::BLOCK;
+use crate::film::TILE;
 
 /// What a dispatch should take: short enough for every watchdog and for a smooth progress bar.
 const DISPATCH: Duration = Duration::from_millis(75);

@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
-use crate::allocation::TILE;
 use crate::error::Result;
+use crate::film::TILE;
 use crate::film::{NonFinite, PixelSums, Tally};
 use crate::gpu::engine::{Engine, Reading, Readings, Recording};
 use crate::gpu::layout::{ChosenTiles, CountersRecord};

@@ -7,10 +7,8 @@ use std::time::Instant;
 
 use bytemuck::Zeroable as _;
 
-use crate::allocation::{TILE, Tiles};
-use crate::aov::AovSums;
 use crate::error::{Error, Result};
-use crate::film::{PixelSums, Tally, Window};
+use crate::film::{AovSums, PixelSums, TILE, Tally, Tiles, Window};
 use crate::gpu::aov::AovLayout;
 use crate::gpu::data::{self, SCENE};
 use crate::gpu::device::Gpu;

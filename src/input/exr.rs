@@ -14,10 +14,9 @@ use exr::meta::attribute::{AttributeValue, SampleType, Text};
 use exr::meta::header::Header;
 use exr::prelude::{Vec2, f16};
 
-use super::{Encoding, Input, check_size, invalid};
-use crate::output::exr::{ATTRIBUTE_PREFIX, REC_709};
-use crate::output::npy::shown;
-use crate::output::{Format, Picture};
+use super::{Encoding, Input, check_size, invalid, shown};
+use crate::image::exr::{ATTRIBUTE_PREFIX, REC_709, STDERR, channel_name, layer_of};
+use crate::image::{Format, Picture};
 
 type Source<'a> = Reader<Cursor<&'a [u8]>>;
 
@@ -92,15 +91,15 @@ fn choose(headers: &[Header]) -> io::Result<Choice> {
             .iter()
             .map(|c| c.name.to_string())
             .collect();
-        let mut layers: Vec<&str> = names.iter().map(|name| layer(name)).collect();
+        let mut layers: Vec<&str> = names.iter().map(|name| layer_of(name)).collect();
         layers.sort_unstable();
         layers.dedup();
         // Channels without a layer are the image; the layers beside them belong to it.
         if layers.contains(&"") && channels(&names, "").is_some() {
             layers = vec![""];
         }
-        let stderr = channels(&names, "stderr");
-        for layer in layers.into_iter().filter(|&layer| layer != "stderr") {
+        let stderr = channels(&names, STDERR);
+        for layer in layers.into_iter().filter(|&layer| layer != STDERR) {
             let Some(colour) = channels(&names, layer) else {
                 continue;
             };
@@ -154,18 +153,10 @@ fn choose(headers: &[Header]) -> io::Result<Choice> {
     }
 }
 
-/// The layer of a channel: what stands before the last point.
-fn layer(channel: &str) -> &str {
-    channel.rsplit_once('.').map_or("", |(layer, _)| layer)
-}
-
 /// The indices of a layer's red, green and blue, or three times its grey.
 fn channels(names: &[String], layer: &str) -> Option<[usize; 3]> {
     let find = |channel: &str| {
-        let name = match layer {
-            "" => channel.to_owned(),
-            layer => format!("{layer}.{channel}"),
-        };
+        let name = channel_name(layer, channel);
         names.iter().position(|n| n.eq_ignore_ascii_case(&name))
     };
     match [find("R"), find("G"), find("B")] {

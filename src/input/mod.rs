@@ -13,10 +13,8 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
-pub use self::png::linear;
-
-use crate::error::{Error, Result};
-use crate::output::{Format, Picture};
+use crate::error::{Action, Error, Result};
+use crate::image::{Format, Picture};
 
 /// An image and what its file says about it.
 #[derive(Clone, Debug, PartialEq)]
@@ -72,13 +70,6 @@ impl Input {
     }
 }
 
-/// The first bytes of a PNG file.
-const PNG: &[u8] = b"\x89PNG\r\n\x1a\n";
-/// The first bytes of an EXR file.
-const EXR: &[u8] = &[0x76, 0x2f, 0x31, 0x01];
-/// The first bytes of an NPY file.
-const NPY: &[u8] = crate::output::npy::MAGIC;
-
 /// Reads an image file. Its first bytes say what it is, whatever its extension.
 ///
 /// # Errors
@@ -93,7 +84,7 @@ pub fn read(path: &Path) -> Result<Input> {
             ..input
         })
         .map_err(|source| Error::File {
-            action: "cannot read",
+            action: Action::Read,
             path: path.to_path_buf(),
             source,
         })
@@ -102,7 +93,9 @@ pub fn read(path: &Path) -> Result<Input> {
 /// All bytes, if the first few are those of an image: anything else may have no end.
 fn read_all(mut file: File) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
-    (&mut file).take(PNG.len() as u64).read_to_end(&mut bytes)?;
+    let longest = Format::ALL.map(|format| format.magic().len());
+    let first = longest.into_iter().max().unwrap_or(0);
+    (&mut file).take(first as u64).read_to_end(&mut bytes)?;
     kind(&bytes)?;
     file.read_to_end(&mut bytes)?;
     Ok(bytes)
@@ -121,10 +114,9 @@ pub fn decode(bytes: &[u8]) -> io::Result<Input> {
 }
 
 fn kind(bytes: &[u8]) -> io::Result<Format> {
-    [(PNG, Format::Png), (EXR, Format::Exr), (NPY, Format::Npy)]
+    Format::ALL
         .into_iter()
-        .find(|(magic, _)| bytes.starts_with(magic))
-        .map(|(_, format)| format)
+        .find(|format| bytes.starts_with(format.magic()))
         .ok_or_else(|| invalid("this is neither an EXR, nor a PNG, nor an NPY file"))
 }
 
@@ -152,4 +144,14 @@ fn check_size(
 
 fn invalid(text: impl Into<String>) -> io::Error {
     io::Error::new(io::ErrorKind::InvalidData, text.into())
+}
+
+/// A part of a file as a message may show it: what is corrupt can be long and hold control
+/// characters.
+fn shown(text: &str) -> String {
+    let visible = |c: char| match c {
+        '\'' | '"' => vec![c],
+        _ => c.escape_debug().collect(),
+    };
+    text.trim().chars().take(80).flat_map(visible).collect()
 }

@@ -7,8 +7,8 @@ use std::io::{self, Cursor};
 
 use png::{BitDepth, ColorType, Decoder, DecodingError, Info, Limits, Transformations};
 
-use super::{Encoding, Input, check_size, invalid};
-use crate::output::{Format, Picture};
+use super::{Encoding, Input, check_size, invalid, shown};
+use crate::image::{Format, Picture, linear};
 
 /// Deflate packs by at most this.
 const RATIO: u64 = 1032;
@@ -80,16 +80,6 @@ impl Encoding {
     }
 }
 
-/// The inverse of sRGB's transfer function, IEC 61966-2-1: linear value of a display value.
-#[must_use]
-pub fn linear(display: f64) -> f64 {
-    if display <= 0.040_45 {
-        display / 12.92
-    } else {
-        ((display + 0.055) / 1.055).powf(2.4)
-    }
-}
-
 fn encoding(info: &Info<'_>, notes: &mut Vec<String>) -> io::Result<Encoding> {
     if let Some(points) = info.coding_independent_code_points {
         // ITU-T H.273, tables 2 and 3.
@@ -151,6 +141,6 @@ fn corrupt(error: DecodingError) -> io::Error {
     match error {
         DecodingError::IoError(error) if error.kind() != io::ErrorKind::UnexpectedEof => error,
         DecodingError::IoError(_) => invalid("the file ends early"),
-        other => invalid(crate::output::npy::shown(&other.to_string())),
+        other => invalid(shown(&other.to_string())),
     }
 }

@@ -1,9 +1,8 @@
 //! What an EXR file can hold beside the image (`--aov`), and its values.
 
 use super::Layer;
-use crate::aov::{AovSums, LightClass};
-use crate::estimate::Estimate;
-use crate::film::Film;
+use crate::film::{AovSums, Estimate, Film, LightClass};
+use crate::image::exr::{RGB, STDERR};
 
 /// A layer, by its name in the file and on the command line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -35,7 +34,7 @@ impl Aov {
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
-            Self::Stderr => "stderr",
+            Self::Stderr => STDERR,
             Self::Samples => "samples",
             Self::Emission => "emission",
             Self::Direct => "direct",
@@ -55,7 +54,7 @@ impl Aov {
             Self::Samples => &["N"],
             Self::Normal => &["X", "Y", "Z"],
             Self::Depth => &["Z"],
-            _ => &["R", "G", "B"],
+            _ => RGB,
         }
     }
 

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use tempfile::NamedTempFile;
 
-use crate::error::{Error, Result};
+use crate::error::{Action, Error, Result};
 
 /// Writes `bytes` to `path`, all or nothing. A new file has the permissions that any new file
 /// would have, a replaced one keeps its own; a symbolic link stays, and what it leads to is
@@ -19,7 +19,7 @@ use crate::error::{Error, Result};
 /// remains.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
     replace(path, bytes).map_err(|source| Error::File {
-        action: "cannot write",
+        action: Action::Write,
         path: path.to_path_buf(),
         source,
     })

@@ -1,21 +1,19 @@
 //! OpenEXR: linear 32-bit floats, bit for bit, with layers and attributes.
 //!
-//! One part, scan lines, ZIP compression (lossless). Layers follow the convention that every viewer
-//! knows: channel `R` of the layer `stderr` is the channel `stderr.R`.
+//! One part, scan lines, ZIP compression (lossless).
 
 use std::collections::HashSet;
 use std::io::{self, Cursor};
 
-use exr::meta::attribute::{AttributeValue, Chromaticities, Text};
+use exr::meta::attribute::{AttributeValue, Text};
 use exr::prelude::{
     AnyChannel, AnyChannels, Blocks, Compression, Encoding, FlatSamples, Image, Layer as ExrLayer,
     LayerAttributes, LineOrder, Vec2, WritableImage,
 };
 
-use super::{Metadata, Picture, Value};
-
-/// Precedes the names of our attributes, which keeps them apart from those of the standard.
-pub const ATTRIBUTE_PREFIX: &str = "gpu-trace:";
+use super::{Metadata, Value};
+use crate::image::Picture;
+use crate::image::exr::{ATTRIBUTE_PREFIX, REC_709, RGB, channel_name};
 
 /// Channels that belong together, beside the image itself.
 #[derive(Clone, Copy, Debug)]
@@ -41,7 +39,7 @@ pub struct Layer<'a> {
 pub fn encode(picture: &Picture, layers: &[Layer<'_>], metadata: &Metadata) -> io::Result<Vec<u8>> {
     let main = Layer {
         name: "",
-        channels: &["R", "G", "B"],
+        channels: RGB,
         values: picture.pixels.as_flattened(),
     };
     let mut names = HashSet::new();
@@ -54,10 +52,7 @@ pub fn encode(picture: &Picture, layers: &[Layer<'_>], metadata: &Metadata) -> i
             )));
         }
         for (index, channel) in layer.channels.iter().enumerate() {
-            let name = match layer.name {
-                "" => (*channel).to_owned(),
-                layer => format!("{layer}.{channel}"),
-            };
+            let name = channel_name(layer.name, channel);
             if channel.is_empty() || !names.insert(name.clone()) {
                 return Err(invalid(format!(
                     "the channel name '{name}' is empty or used twice"
@@ -96,14 +91,6 @@ pub fn encode(picture: &Picture, layers: &[Layer<'_>], metadata: &Metadata) -> i
         })?;
     Ok(bytes.into_inner())
 }
-
-/// What readers assume where a file does not say so.
-pub(crate) const REC_709: Chromaticities = Chromaticities {
-    red: Vec2(0.64, 0.33),
-    green: Vec2(0.30, 0.60),
-    blue: Vec2(0.15, 0.06),
-    white: Vec2(0.3127, 0.3290),
-};
 
 fn attributes(metadata: &Metadata) -> LayerAttributes {
     let mut attributes = LayerAttributes {

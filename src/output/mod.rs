@@ -10,7 +10,6 @@ pub mod atomic;
 pub mod exr;
 pub mod metadata;
 pub mod npy;
-pub mod numbers;
 pub mod png;
 pub mod progress;
 pub mod stats;
@@ -19,50 +18,14 @@ mod target;
 pub use aov::{Aov, Plane};
 pub use exr::Layer;
 pub use metadata::{Metadata, Value};
-pub use npy::read_npy;
 pub use progress::{Progress, ProgressMode, Snapshot};
 pub use stats::Stats;
-pub use target::{Format, Target, check_all};
+pub use target::{Target, check_all};
 
 use std::io;
 
-use crate::error::{Error, Result};
-
-/// An image in linear RGB with the primaries of sRGB (Rec. 709), in the unit of radiance.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Picture {
-    /// Columns, at least 1.
-    pub width: u32,
-    /// Rows, at least 1.
-    pub height: u32,
-    /// `width * height` values of red, green and blue, row by row from the top left.
-    pub pixels: Vec<[f32; 3]>,
-}
-
-impl Picture {
-    /// Joins a size and the pixels that fill it.
-    ///
-    /// # Panics
-    /// If the size is zero or `pixels` does not hold `width * height` values: a defect of the
-    /// caller, for files are checked where they are read.
-    #[must_use]
-    pub fn new(width: u32, height: u32, pixels: Vec<[f32; 3]>) -> Self {
-        assert!(
-            width > 0 && height > 0,
-            "an image of {width}x{height} pixels"
-        );
-        assert_eq!(
-            pixels.len() as u64,
-            u64::from(width) * u64::from(height),
-            "the number of pixels of an image of {width}x{height}"
-        );
-        Self {
-            width,
-            height,
-            pixels,
-        }
-    }
-}
+use crate::error::{Action, Error, Result};
+use crate::image::{Format, Picture};
 
 /// Everything that an image file can say about a render. Each format takes what it can hold.
 #[derive(Clone, Copy, Debug)]
@@ -113,7 +76,7 @@ pub fn write_all(targets: &[Target], contents: &Contents<'_>) -> Result<()> {
         source = io::Error::new(source.kind(), text);
     }
     Err(Error::File {
-        action: "cannot write",
+        action: Action::Write,
         path: first.path.clone(),
         source,
     })

@@ -8,7 +8,8 @@ use std::io;
 
 use png::{BitDepth, ColorType, Encoder, EncodingError, SrgbRenderingIntent};
 
-use super::{Metadata, Picture};
+use super::Metadata;
+use crate::image::{Picture, srgb};
 
 /// The colour of pixels that hold no number.
 const NON_FINITE: [u8; 3] = [255, 0, 255];
@@ -40,16 +41,6 @@ pub fn quantise(pixel: [f32; 3], gain: f64) -> [u8; 3] {
     }
     // The conversion to u8 saturates, which clips what is above 1.
     pixel.map(|value| (255.0 * srgb(f64::from(value) * gain)).round() as u8)
-}
-
-/// The transfer function of sRGB, IEC 61966-2-1: display value of a linear one; 0 and below are 0.
-#[must_use]
-pub fn srgb(linear: f64) -> f64 {
-    if linear <= 0.003_130_8 {
-        12.92 * linear.max(0.0)
-    } else {
-        1.055 * linear.powf(1.0 / 2.4) - 0.055
-    }
 }
 
 fn write(picture: &Picture, levels: &[u8], metadata: &Metadata) -> Result<Vec<u8>, EncodingError> {

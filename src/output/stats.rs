@@ -6,11 +6,11 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::{Metadata, atomic};
-use crate::error::{Error, Result};
-pub use crate::estimate::VarianceClass;
+use crate::error::{Action, Error, Result};
 pub use crate::film::NonFinite;
 pub use crate::ledger::Entry;
 pub use crate::render::StoppedBy;
+pub use crate::variance::VarianceClass;
 
 /// All that is known of a finished render. The names are those of the JSON, which users' scripts
 /// rely on: add members, but rename and remove none.
@@ -142,7 +142,7 @@ impl Stats {
         self.to_json()
             .and_then(|json| atomic::replace(path, json.as_bytes()))
             .map_err(|source| Error::File {
-                action: "cannot write",
+                action: Action::Write,
                 path: path.to_path_buf(),
                 source,
             })

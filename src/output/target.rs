@@ -5,17 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::atomic;
 use crate::error::{Error, Result};
-
-/// The image formats, each known by its extension.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Format {
-    /// sRGB with 8 bits: to look at.
-    Png,
-    /// Linear 32-bit floats with layers and attributes: to work with.
-    Exr,
-    /// Linear 32-bit floats of shape (height, width, 3): to compute with.
-    Npy,
-}
+use crate::image::Format;
 
 /// An image file to be written.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -24,18 +14,6 @@ pub struct Target {
     pub path: PathBuf,
     /// What to write there.
     pub format: Format,
-}
-
-impl Format {
-    /// As people call it.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Png => "PNG",
-            Self::Exr => "EXR",
-            Self::Npy => "NPY",
-        }
-    }
 }
 
 impl Target {

@@ -12,7 +12,7 @@ use super::scene::camera::camera_ray;
 use super::scene::priority::{cross_surface, index_within, relative_index};
 use super::scene::ray::{Hit, Ray, Vertex, leave, vertex_at};
 use super::scene::sphere::closest_hit;
-use crate::aov::{AovSums, LightClass};
+use crate::film::{AovSums, LightClass};
 use crate::materials::{BsdfSample, Event, MaterialKind, Surface, sample_uniform};
 use crate::placement::{Medium, Placement};
 use crate::sampler::Sampler;

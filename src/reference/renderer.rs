@@ -6,10 +6,8 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::path::{PathResult, PathTracer};
-use crate::allocation::Tiles;
-use crate::aov::AovSums;
 use crate::error::{Error, Result};
-use crate::film::{BLOCK, NonFinite, PixelSums, Tally, Window};
+use crate::film::{AovSums, BLOCK, NonFinite, PixelSums, Tally, Tiles, Window};
 use crate::job::Job;
 use crate::placement::Placement;
 use crate::render::{Control, Renderer};

@@ -1,5 +1,8 @@
 //! A name for a scene's values, to tell whether two renders are of the same scene.
 
+use std::hash::Hasher as _;
+
+use fnv::FnvHasher;
 use glam::DVec3;
 
 use super::{Handedness, Scene};
@@ -13,7 +16,7 @@ use crate::materials::{MaterialKind, Value};
 /// over machines and versions, good against accidents, not against forgery.
 #[must_use]
 pub fn content_hash(scene: &Scene) -> String {
-    let mut hash = Fnv::new();
+    let mut hash = Fnv::default();
     let camera = &scene.camera;
     hash.vector(camera.position);
     hash.vector(camera.look_at);
@@ -41,25 +44,19 @@ pub fn content_hash(scene: &Scene) -> String {
         hash.vector(material.emission);
         hash.kind(&material.kind);
     }
-    format!("{:016x}", hash.0)
+    format!("{:016x}", hash.0.finish())
 }
 
-struct Fnv(u64);
+#[derive(Default)]
+struct Fnv(FnvHasher);
 
 impl Fnv {
-    // Offset basis and prime: Fowler, Noll, Vo; draft-eastlake-fnv.
-    fn new() -> Self {
-        Self(0xcbf2_9ce4_8422_2325)
-    }
-
     fn byte(&mut self, byte: u8) {
-        self.0 = (self.0 ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3);
+        self.bytes(&[byte]);
     }
 
     fn bytes(&mut self, bytes: &[u8]) {
-        for &byte in bytes {
-            self.byte(byte);
-        }
+        self.0.write(bytes);
     }
 
     fn number(&mut self, number: f64) {
@@ -112,9 +109,9 @@ mod tests {
 
     #[test]
     fn fnv_has_its_published_values() {
-        let mut hash = Fnv::new();
+        let mut hash = Fnv::default();
         hash.bytes(b"foobar");
-        assert_eq!(hash.0, 0x8594_4171_f739_67e8);
+        assert_eq!(hash.0.finish(), 0x8594_4171_f739_67e8);
     }
 
     #[test]

@@ -14,7 +14,7 @@ use toml::de::{DeTable, Deserializer};
 use super::file::{SceneFile, json_schema};
 use super::report::{Problem, Report};
 use super::{Scene, content_hash, shape, validate};
-use crate::error::{Error, Result};
+use crate::error::{Action, Error, Result};
 
 /// The largest scene file that is read, in bytes; about three million spheres.
 const MAX_FILE_SIZE: u64 = 256 << 20;
@@ -39,7 +39,7 @@ pub struct Loaded {
 pub fn load_file(path: &Path) -> Result<Loaded> {
     let shown = path.display().to_string();
     let bytes = read(path).map_err(|source| Error::File {
-        action: "cannot read",
+        action: Action::Read,
         path: path.to_owned(),
         source,
     })?;

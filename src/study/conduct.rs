@@ -1,97 +1,19 @@
 //! A study from its reference to its last run.
 
-use super::analysis::{Analysis, Subject, analyse};
-use super::identity::Identity;
+use super::analysis::{Analysis, analyse};
+use super::host::Host;
+use super::keeper::Keeper;
 use super::measure::{Noise, Reference};
-use super::pictures::{equal_time_image, is_of_pair, sample_image};
-use super::reference::{ReferenceChoice, reference};
-use super::run::{Length, Observer, Run, advance, execute};
-use super::series::{Series, labels};
+use super::pictures::equal_time_image;
+use super::plan::Study;
+use super::reference::reference;
+use super::run::{Run, advance, execute};
+use super::series::labels;
 use super::store::Store;
 use super::timetable::{Part, Timetable};
 use crate::error::{Error, Result};
 use crate::film::Film;
-use crate::output::{Picture, Snapshot};
-use crate::render::Renderer;
-use crate::scene::Loaded;
-use crate::settings::Settings;
-
-/// All that decides a study.
-#[derive(Debug)]
-pub struct Study {
-    /// What the report is called.
-    pub title: String,
-    /// The scene.
-    pub loaded: Loaded,
-    /// What is compared.
-    pub subjects: Vec<Subject>,
-    /// The size, and what no series decides.
-    pub base: Settings,
-    /// A run of each series for each of these.
-    pub seeds: std::ops::Range<u64>,
-    /// How far each run goes.
-    pub length: Length,
-    /// What errors are measured against.
-    pub reference: ReferenceChoice,
-    /// Numbers of samples whose images the report shows.
-    pub shown: Vec<u64>,
-    /// EV steps that brighten the report's images.
-    pub exposure: f64,
-    /// The command that makes it again.
-    pub command: String,
-    /// What all runs share.
-    pub identity: Identity,
-}
-
-impl Study {
-    /// Whether a run is done: it came to its end, and the images that it should keep are there.
-    #[must_use]
-    pub fn is_done(&self, store: &Store, index: usize, seed: u64) -> bool {
-        let series = self.subjects[index].series;
-        let key = series.key();
-        let has = |spp: u64| store.image(&sample_image(&series, seed, spp)).is_some();
-        let run = store
-            .runs
-            .iter()
-            .find(|r| r.seed == seed && r.series == key);
-        run.is_some_and(|run| {
-            let mut marks = run.points.iter().map(|p| p.spp);
-            run.complete && marks.all(|spp| !self.keeps(index, seed, spp) || has(spp))
-        })
-    }
-
-    /// Whether a run keeps its image of `spp` samples: those of the first seed are shown, and compared
-    /// with those of the same samples in f64.
-    fn keeps(&self, index: usize, seed: u64, spp: u64) -> bool {
-        seed == self.seeds.start
-            && (self.shown.contains(&spp) || is_of_pair(&self.subjects, &self.subjects[index]))
-    }
-}
-
-/// A renderer that is ready, and what that took.
-pub struct Opened {
-    /// The renderer.
-    pub renderer: Box<dyn Renderer>,
-    /// Seconds of opening the device and placing the scene.
-    pub setup: f64,
-    /// Seconds of linking and compiling.
-    pub compile: f64,
-}
-
-/// What a study needs from outside.
-pub trait Host {
-    /// Makes a renderer, from the device on: its time is part of what is measured.
-    ///
-    /// # Errors
-    /// If the device cannot be had.
-    fn open(&mut self, series: &Series, settings: &Settings) -> Result<Opened>;
-    /// Another part of the study begins.
-    fn begin(&mut self, part: &str);
-    /// How far the study is.
-    fn progress(&mut self, snapshot: &Snapshot);
-    /// Whether a signal asked to stop.
-    fn interrupted(&self) -> bool;
-}
+use crate::image::Picture;
 
 /// What a study comes to.
 #[derive(Debug)]
@@ -110,31 +32,6 @@ pub struct Outcome {
     pub equal_time: Vec<(usize, u64, String)>,
     /// What ended it early, beside a signal.
     pub failure: Option<Error>,
-}
-
-/// What a run shows to the timetable and keeps in the store.
-pub(super) struct Keeper<'a, 'b> {
-    pub(super) timetable: &'a mut Timetable<'b>,
-    pub(super) store: &'a Store,
-    /// Index of the series and seed of a run; other renders keep nothing.
-    pub(super) run: Option<(&'a Study, usize, u64)>,
-}
-
-impl Observer for Keeper<'_, '_> {
-    fn proceed(&mut self, paths: u64) -> bool {
-        self.timetable.report(paths);
-        !self.timetable.host.interrupted()
-    }
-
-    fn point(&mut self, spp: u64, film: &Film) -> Result<()> {
-        if let Some((study, index, seed)) = self.run
-            && study.keeps(index, seed, spp)
-        {
-            let name = sample_image(&study.subjects[index].series, seed, spp);
-            self.store.keep_image(&name, film)?;
-        }
-        Ok(())
-    }
 }
 
 /// Conducts a study; `None` if it was stopped before there was a reference.

@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 
-use super::analysis::Summary;
 use super::fit::{Reach, reaches, value_at};
+use super::summary::Summary;
 
 /// Times to one error, by series.
 #[derive(Clone, Debug, Serialize)]

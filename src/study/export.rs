@@ -1,6 +1,6 @@
 //! The figures as CSV and JSON.
 
-use std::fmt::Write as _;
+use std::io;
 
 use serde::Serialize;
 
@@ -8,8 +8,7 @@ use super::analysis::Analysis;
 use super::identity::Identity;
 use super::measure::Noise;
 use super::pictures::Pair;
-use super::run::Run;
-use super::series::Key;
+use super::run::{Point, Run};
 
 /// All of `converge.json`. The names are those of the JSON, which users' scripts rely on: add members,
 /// but rename and remove none.
@@ -49,63 +48,76 @@ impl Document<'_> {
     }
 }
 
+/// The columns of `converge.csv`.
+const COLUMNS: [&str; 20] = [
+    "series",
+    "integrator",
+    "termination",
+    "sampler",
+    "backend",
+    "offset",
+    "max_bounces",
+    "seed",
+    "device",
+    "spp",
+    "seconds",
+    "setup",
+    "compile",
+    "render",
+    "relrmse",
+    "relrmse_measured",
+    "mse",
+    "mse_measured",
+    "mean_error",
+    "estimated",
+];
+
 /// A row for each point of each run. Errors named `measured` have the reference's noise in them, the
 /// others do not, and are empty where that leaves nothing.
-#[must_use]
-pub fn csv(analysis: &Analysis, runs: &[Run], noise: Option<Noise>) -> String {
+///
+/// # Errors
+/// None that are known: memory takes every row.
+pub fn csv(analysis: &Analysis, runs: &[Run], noise: Option<Noise>) -> io::Result<Vec<u8>> {
     let noise = noise.unwrap_or_default();
-    let mut text = String::from(
-        "series,integrator,termination,sampler,backend,offset,max_bounces,seed,device,spp,seconds,setup,\
-         compile,render,relrmse,relrmse_measured,mse,mse_measured,mean_error,estimated\n",
-    );
+    let mut table = csv::Writer::from_writer(Vec::new());
+    table.write_record(COLUMNS)?;
     for summary in &analysis.series {
         for run in runs.iter().filter(|r| r.series == summary.series) {
-            let Key {
-                integrator,
-                termination,
-                sampler,
-                backend,
-                offset,
-                max_bounces,
-            } = &run.series;
-            let termination = termination.map_or_else(String::new, |p| p.to_string());
-            for p in &run.points {
-                let square = p.relmse - noise.relmse;
-                let relrmse = if square > 0.0 {
-                    format!("{:e}", square.sqrt())
-                } else {
-                    String::new()
-                };
-                let estimated = p.estimated.map_or_else(String::new, |e| format!("{e:e}"));
-                let _ = writeln!(
-                    text,
-                    "{},{integrator},{termination},{sampler},{},{offset},{max_bounces},{},{},{},{:.6},{:.6},\
-                     {:.6},{:.6},{relrmse},{:e},{:e},{:e},{:e},{estimated}",
-                    quoted(&summary.label),
-                    backend.name(),
-                    run.seed,
-                    quoted(&run.device),
-                    p.spp,
-                    run.setup + run.compile + p.seconds,
-                    run.setup,
-                    run.compile,
-                    p.seconds,
-                    p.relmse.sqrt(),
-                    p.mse - noise.mse,
-                    p.mse,
-                    p.bias,
-                );
+            for point in &run.points {
+                table.write_record(row(&summary.label, run, point, noise))?;
             }
         }
     }
-    text
+    table.into_inner().map_err(|error| error.into_error())
 }
 
-/// A field as RFC 4180 has it.
-fn quoted(field: &str) -> String {
-    if field.contains([',', '"', '\n', '\r']) {
-        format!("\"{}\"", field.replace('"', "\"\""))
-    } else {
-        field.to_owned()
-    }
+/// The cells of one point, in the order of [`COLUMNS`].
+fn row(label: &str, run: &Run, point: &Point, noise: Noise) -> [String; 20] {
+    let key = &run.series;
+    let square = point.relmse - noise.relmse;
+    let scientific = |x: f64| format!("{x:e}");
+    let seconds = |x: f64| format!("{x:.6}");
+    let or_empty = |x: Option<String>| x.unwrap_or_default();
+    [
+        label.to_owned(),
+        key.integrator.clone(),
+        or_empty(key.termination.map(|p| p.to_string())),
+        key.sampler.clone(),
+        key.backend.name().to_owned(),
+        key.offset.clone(),
+        key.max_bounces.to_string(),
+        run.seed.to_string(),
+        run.device.clone(),
+        point.spp.to_string(),
+        seconds(run.setup + run.compile + point.seconds),
+        seconds(run.setup),
+        seconds(run.compile),
+        seconds(point.seconds),
+        or_empty((square > 0.0).then(|| scientific(square.sqrt()))),
+        scientific(point.relmse.sqrt()),
+        scientific(point.mse - noise.mse),
+        scientific(point.mse),
+        scientific(point.bias),
+        or_empty(point.estimated.map(scientific)),
+    ]
 }

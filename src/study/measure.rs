@@ -154,8 +154,8 @@ mod tests {
     use crate::check::Random;
     use crate::compare::Errors;
     use crate::film::{PixelSums, Tally, Window};
+    use crate::image::{Format, Picture};
     use crate::input::Encoding;
-    use crate::output::{Format, Picture};
     use crate::settings::Rect;
     use statrs::distribution::{ContinuousCDF, Normal};
     use std::collections::BTreeMap;

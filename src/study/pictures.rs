@@ -2,11 +2,11 @@
 
 use serde::Serialize;
 
-use super::analysis::{Analysis, Subject};
-use super::series::{Series, labels};
+use super::analysis::Analysis;
+use super::series::{Series, Subject, labels};
 use super::store::Store;
 use crate::compare::{Errors, HeatMap};
-use crate::output::Picture;
+use crate::image::Picture;
 
 /// An image with what the report says of it.
 #[derive(Clone, Debug)]

@@ -1,30 +1,17 @@
 //! The image that a study measures errors against: a file, or a long render of its own.
 
-use super::conduct::{Keeper, Study};
+use super::keeper::Keeper;
+use super::plan::{ReferenceChoice, Study};
 use super::run::advance;
 use super::series::Series;
 use super::store::{REFERENCE, Store};
 use super::timetable::{Part, Timetable};
-use crate::error::{Error, Result};
+use crate::error::{Action, Error, Result};
 use crate::film::Film;
+use crate::image::exr::{RGB, STDERR};
+use crate::image::{Format, Picture};
 use crate::input::{Input, read};
-use crate::output::{Contents, Format, Layer, Metadata, Picture, Value};
-
-/// What errors are measured against.
-#[derive(Debug)]
-pub enum ReferenceChoice {
-    /// An image from a file.
-    File(Box<Input>),
-    /// A long render.
-    Own {
-        /// How it is rendered.
-        series: Series,
-        /// Samples a pixel.
-        spp: u64,
-        /// No run has it.
-        seed: u64,
-    },
-}
+use crate::output::{Contents, Layer, Metadata, Value};
 
 /// The reference: from its file, or from the study's directory, or rendered and put there; `None` if
 /// it was stopped before the end.
@@ -66,7 +53,7 @@ pub(super) fn reference(
         .with("scene", study.loaded.name.as_str())
         .with("device", opened.renderer.device().0);
     let bytes = encode(&film, metadata).map_err(|source| Error::File {
-        action: "cannot write",
+        action: Action::Write,
         path: path.clone(),
         source,
     })?;
@@ -108,8 +95,8 @@ fn encode(film: &Film, metadata: Metadata) -> std::io::Result<Vec<u8>> {
     let layers: Vec<Layer<'_>> = errors
         .iter()
         .map(|values| Layer {
-            name: "stderr",
-            channels: &["R", "G", "B"],
+            name: STDERR,
+            channels: RGB,
             values: values.as_flattened(),
         })
         .collect();

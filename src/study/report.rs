@@ -8,10 +8,11 @@ use base64::engine::general_purpose::STANDARD;
 
 use super::pictures::Shot;
 use super::plot::{Plot, escape, style};
-use super::tables::Table;
+use super::table::Table;
 use crate::compare::{HeatMap, heat_colour};
-use crate::output::numbers::percent;
-use crate::output::{Contents, Format, Metadata, Picture};
+use crate::image::{Format, Picture};
+use crate::numbers::percent;
+use crate::output::{Contents, Metadata};
 
 /// What the report says.
 #[derive(Debug)]

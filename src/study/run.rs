@@ -8,8 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::measure::Reference;
 use super::series::Key;
 use crate::error::Result;
-use crate::estimate::Estimate;
-use crate::film::{Film, window_end};
+use crate::film::{Estimate, Film, window_end};
 use crate::render::{Control, Renderer};
 use crate::settings::Rect;
 

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 pub use crate::backend::BackendKind;
 use crate::sampler::Sampler;
 use crate::settings::{Integrator, Offset, Settings};
+use crate::variance::VarianceClass;
 
 /// One way to render; a run is a series with a seed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,6 +20,15 @@ pub struct Series {
     pub offset: Offset,
     /// The most scattering events of a path.
     pub max_bounces: u32,
+}
+
+/// A series and what is known of its variance beforehand.
+#[derive(Clone, Copy, Debug)]
+pub struct Subject {
+    /// The series.
+    pub series: Series,
+    /// Whether its mean square error has a mean.
+    pub variance: VarianceClass,
 }
 
 /// A series as files name it: runs belong to the series whose key is the same.
@@ -84,6 +94,21 @@ impl Series {
         let offset = offset.replace([':', '+'], "");
         let backend = backend.name();
         format!("{integrator}{termination}-{sampler}-{backend}-{offset}-{max_bounces}")
+    }
+
+    /// What decides the kernel: all but what renders, for the f64 twin changes with it.
+    #[must_use]
+    pub fn way(&self) -> String {
+        let Key {
+            integrator,
+            termination,
+            sampler,
+            backend: _,
+            offset,
+            max_bounces,
+        } = self.key();
+        let termination = termination.map_or_else(String::new, |p| format!(" {p}"));
+        format!("{integrator}{termination} {sampler} {offset} {max_bounces}")
     }
 
     /// The same paths in f64 without any nudge: what rounding and nudges are told by.

@@ -10,11 +10,13 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use serde_json::Value;
 
-use super::identity::{Identity, ReferenceIdentity, differs, plain};
+use super::identity::{Identity, ReferenceIdentity};
 use super::run::Run;
-use crate::error::{Error, Result};
+use crate::error::{Action, Error, Result};
 use crate::film::Film;
-use crate::output::{Picture, atomic, npy, read_npy};
+use crate::image::Picture;
+use crate::input::read;
+use crate::output::{atomic, npy};
 
 /// An open directory.
 #[derive(Debug)]
@@ -64,7 +66,7 @@ impl Store {
                 store.check_unused()?;
                 store.begin(identity)
             }
-            Err(source) => Err(file("cannot read", &runs, source)),
+            Err(source) => Err(file(Action::Read, &runs, source)),
         }
     }
 
@@ -114,7 +116,7 @@ impl Store {
     /// An image that was kept; `None` if there is none of the study's size that can be read.
     #[must_use]
     pub fn image(&self, name: &str) -> Option<Picture> {
-        let picture = read_npy(&self.path(&image_path(name))).ok()?;
+        let picture = read(&self.path(&image_path(name))).ok()?.picture;
         ([picture.width, picture.height] == self.size).then_some(picture)
     }
 
@@ -144,7 +146,7 @@ impl Store {
 
     fn make_images(&self) -> Result<()> {
         let images = self.path(IMAGES);
-        fs::create_dir_all(&images).map_err(|source| file("cannot write", &images, source))
+        fs::create_dir_all(&images).map_err(|source| file(Action::Write, &images, source))
     }
 
     /// Removes what an older study wrote, and nothing else.
@@ -160,7 +162,7 @@ impl Store {
             old.push(reference);
         }
         let images = self.path(IMAGES);
-        let unreadable = |source| file("cannot read", &images, source);
+        let unreadable = |source| file(Action::Read, &images, source);
         match fs::read_dir(&images) {
             Ok(entries) => {
                 for entry in entries {
@@ -177,7 +179,7 @@ impl Store {
         for path in old {
             match fs::remove_file(&path) {
                 Err(error) if error.kind() != io::ErrorKind::NotFound => {
-                    return Err(file("cannot remove", &path, error));
+                    return Err(file(Action::Remove, &path, error));
                 }
                 _ => {}
             }
@@ -196,37 +198,26 @@ impl Store {
         let whole = bytes.iter().rposition(|b| *b == b'\n').map_or(0, |i| i + 1);
         let text = str::from_utf8(&bytes[..whole]).map_err(|_| damaged(1))?;
         let mut lines = text.lines().enumerate();
-        let mut there: Value = lines
+        let first: Value = lines
             .next()
             .and_then(|(_, line)| serde_json::from_str(line).ok())
             .ok_or_else(|| damaged(1))?;
-        let mut here = serde_json::to_value(identity).map_err(|_| damaged(1))?;
-        // Runs on a GPU can join those on the CPU, and the other way round; two GPUs differ.
-        let first_gpu = there.get("gpu").is_some_and(Value::is_null) && !here["gpu"].is_null();
-        match first_gpu {
-            true => there["gpu"] = here["gpu"].clone(),
-            false if here["gpu"].is_null() => {
-                here["gpu"] = there.get("gpu").cloned().unwrap_or_default();
-            }
-            false => {}
-        }
-        if let Some(name) = differs(&there, &here) {
-            let shown = |v: &Value| v.get(name).map_or("nothing".into(), plain);
+        if let Some(difference) = identity.differs(&first) {
             return Err(Error::Usage(format!(
-                "the directory {} holds a study with another {name}: {} there, {} now; choose another \
-                 directory with -o, or start over with --fresh",
-                self.directory.display(),
-                shown(&there),
-                shown(&here)
+                "the directory {} holds a {difference}; choose another directory with -o, or start over \
+                 with --fresh",
+                self.directory.display()
             )));
         }
+        let there: Identity = serde_json::from_value(first).map_err(|_| damaged(1))?;
         for (index, line) in lines {
             let run: Run = serde_json::from_str(line).map_err(|_| damaged(index + 1))?;
             self.count(run);
         }
         let runs = text.split_once('\n').map_or("", |(_, runs)| runs);
-        if first_gpu {
-            self.write(RUNS, format!("{}\n{runs}", json(identity)).as_bytes())?;
+        let joined = identity.joined(&there);
+        if joined != there {
+            self.write(RUNS, format!("{}\n{runs}", json(&joined)).as_bytes())?;
         } else if whole < bytes.len() {
             // What follows must not be joined to the torn line.
             self.write(RUNS, &bytes[..whole])?;
@@ -241,7 +232,19 @@ impl Store {
             .append(true)
             .open(&path)
             .and_then(|mut file: File| file.write_all(format!("{line}\n").as_bytes()));
-        appended.map_err(|source| file("cannot write", &path, source))
+        appended.map_err(|source| file(Action::Write, &path, source))
+    }
+}
+
+/// What rendered the reference of the study in a directory, if there is one and it is its own.
+#[must_use]
+pub fn backend_of_reference(directory: &Path) -> Option<String> {
+    let bytes = fs::read(directory.join(RUNS)).ok()?;
+    let line = bytes.split(|b| *b == b'\n').next()?;
+    let identity: Identity = serde_json::from_slice(line).ok()?;
+    match identity.reference {
+        ReferenceIdentity::Own { backend, .. } => Some(backend),
+        ReferenceIdentity::File { .. } => None,
     }
 }
 
@@ -249,7 +252,7 @@ fn image_path(name: &str) -> String {
     format!("{IMAGES}/{name}.npy")
 }
 
-fn file(action: &'static str, path: &Path, source: io::Error) -> Error {
+fn file(action: Action, path: &Path, source: io::Error) -> Error {
     Error::File {
         action,
         path: path.to_owned(),
@@ -269,6 +272,8 @@ fn same_file(a: &Path, b: &Path) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeMap;
+
     use super::super::run::Point;
     use super::super::series::{BackendKind, Key};
     use super::*;
@@ -284,6 +289,7 @@ mod tests {
             reference,
             threads: 0,
             gpu: None,
+            kernels: BTreeMap::from([("bsdf".to_owned(), "1".to_owned())]),
         }
     }
 
@@ -391,6 +397,41 @@ mod tests {
         assert_eq!(open(None).expect("the CPU alone"), 1);
         assert!(refused("b").contains("another gpu: a there, b now"));
         assert_eq!(open(Some("a")).expect("the same"), 1);
+    }
+
+    #[test]
+    fn series_join_and_another_kernel_is_refused() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let open = |kernels: &[(&str, &str)]| {
+            let owned = |(way, hash): &(&str, &str)| ((*way).to_owned(), (*hash).to_owned());
+            let identity = Identity {
+                kernels: kernels.iter().map(owned).collect(),
+                ..identity(own())
+            };
+            Store::open(folder.path(), &identity, false).map(drop)
+        };
+        let refused = |kernels| open(kernels).expect_err("another").to_string();
+        open(&[("bsdf", "1")]).expect("a new study");
+        assert!(refused(&[("bsdf", "2")]).contains("another kernel for bsdf: 1 there, 2 now"));
+        open(&[("nee", "3")]).expect("another series");
+        open(&[("bsdf", "1"), ("nee", "3")]).expect("both");
+        // That of the series that has joined counts as well.
+        let both = refused(&[("bsdf", "1"), ("nee", "4")]);
+        assert!(
+            both.contains("another kernel for nee: 3 there, 4 now"),
+            "{both}"
+        );
+
+        let path = folder.path().join(RUNS);
+        let text = fs::read_to_string(&path).expect("a file");
+        let mut first: Value = serde_json::from_str(&text).expect("one line");
+        first.as_object_mut().expect("members").remove("kernels");
+        fs::write(&path, format!("{first}\n")).expect("a file");
+        let old = refused(&[("bsdf", "1")]);
+        assert!(
+            old.contains("did not say which kernels") && old.contains("--fresh"),
+            "{old}"
+        );
     }
 
     #[test]

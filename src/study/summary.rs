@@ -1,399 +1,293 @@
-//! What a study leaves: CSV, JSON, plots and the report.
+//! What the runs of one series say: errors at equal samples, slopes, bias, efficiency.
 
-use super::analysis::{Level, Summary};
-use super::conduct::{Outcome, Study};
-use super::export::{Document, csv};
-use super::pictures::{Pair, Shot, align, pairs, sample_image};
-use super::plot::{Axis, Curve, Plot};
-use super::reference::ReferenceChoice;
-use super::report::{Gallery, Report};
-use super::run::Run;
-use super::series::labels;
-use super::store::{FILES, Store};
-use super::tables;
-use crate::compare::HeatMap;
-use crate::error::{Error, Result};
-use crate::estimate::VarianceClass;
-use crate::output::Picture;
-use crate::output::numbers::{percent, significant};
+use serde::Serialize;
 
-/// Writes all files of a study.
-///
-/// # Errors
-/// [`Error::File`]
-pub fn write(study: &Study, store: &Store, outcome: &Outcome, warnings: &[String]) -> Result<()> {
-    let analysis = &outcome.analysis;
-    let runs: Vec<Run> = store
-        .runs
-        .iter()
-        .filter(|r| study.seeds.contains(&r.seed))
-        .filter(|r| analysis.series.iter().any(|s| s.series == r.series))
-        .cloned()
-        .collect();
-    let pairs = pairs(store, &study.subjects, study.seeds.start, analysis);
-    let plots = [Axis::Seconds, Axis::Samples].map(|axis| plot(study, outcome, axis));
-    let document = Document {
-        command: &study.command,
-        study: &study.identity,
-        reference_mean: outcome.reference.mean,
-        reference_noise: outcome.noise,
-        complete: outcome.complete,
-        exposure: study.exposure,
-        analysis,
-        pairs: &pairs,
-        runs: &runs,
-        warnings,
-    };
-    let report = report(study, store, outcome, &pairs, &plots, warnings)?;
-    let [time, spp] = &plots;
-    let contents = [
-        csv(analysis, &runs, outcome.noise),
-        document.json(),
-        time.file(),
-        spp.file(),
-        report,
-    ];
-    for (name, text) in FILES.iter().zip(contents) {
-        store.write(name, text.as_bytes())?;
-    }
-    Ok(())
+use super::bootstrap::{Interval, quantile};
+use super::fit::{bias_fit, slope, value_at};
+use super::measure::Noise;
+use super::run::{Point, Run};
+use super::series::{Key, Subject};
+use crate::variance::VarianceClass;
+
+/// Samples a pixel from which slopes are fitted, where there are enough points: before that, pixels
+/// are black or bright by chance.
+const SETTLED: u64 = 16;
+
+/// What the runs of a series say.
+#[derive(Clone, Debug, Serialize)]
+pub struct Summary {
+    /// What tells it from the others.
+    pub label: String,
+    /// The series.
+    pub series: Key,
+    /// Where it is `infinite`, errors are medians over the runs, and there are no means.
+    pub variance: VarianceClass,
+    /// Runs, those cut short included.
+    pub runs: usize,
+    /// Median seconds of opening the device and placing the scene.
+    pub setup: f64,
+    /// Median seconds of linking and compiling.
+    pub compile: f64,
+    /// Median seconds of rendering one sample a pixel, at the last level.
+    pub seconds_per_sample: f64,
+    /// Samples that were no finite number, over all runs.
+    pub non_finite: u64,
+    /// At 1, 2, 4, ... samples a pixel.
+    pub levels: Vec<Level>,
+    /// Of ln error over ln samples.
+    pub slope_spp: Option<Interval>,
+    /// Of ln error over ln seconds of rendering.
+    pub slope_time: Option<Interval>,
+    /// The fit of MSE = b² + v/N; `null` where the variance is infinite, or there are too few levels.
+    pub bias: Option<Bias>,
+    /// 1/(MSE t) at the last level, t with setup and compilation; `null` where the variance is infinite.
+    pub efficiency: Option<Interval>,
 }
 
-/// The best series at equal time, in a sentence.
-#[must_use]
-pub fn lead(outcome: &Outcome) -> String {
-    let series = &outcome.analysis.series;
-    let Some(time) = outcome.analysis.equal_time.last() else {
-        return "There are no errors yet.".into();
-    };
-    let mut ranks: Vec<(f64, &Summary)> = time
-        .errors
-        .iter()
-        .zip(series)
-        .filter_map(|(error, s)| Some(((*error)?, s)))
-        .collect();
-    ranks.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let after = tables::seconds(time.seconds);
-    match ranks.as_slice() {
-        [] => "No error is known at equal time: all of them are below the reference's own noise."
-            .into(),
-        [(error, only)] if series.len() == 1 => {
-            let spp = only.levels.last().map_or(0, |l| l.spp);
-            format!(
-                "After {after}, at {spp} samples a pixel, the error is {}.",
-                percent(*error)
-            )
-        }
-        [(error, best)] => format!(
-            "After {after} only {} has come to an error yet: {}.",
-            best.label,
-            percent(*error)
-        ),
-        [(low, best), .., (high, worst)] => format!(
-            "After {after}, {} has the smallest error, {}; {} has the largest, {}, {} times that.",
-            best.label,
-            percent(*low),
-            worst.label,
-            percent(*high),
-            significant(high / low)
-        ),
-    }
+/// A series after some number of samples.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Level {
+    /// Samples a pixel.
+    pub spp: u64,
+    /// Runs that came so far.
+    pub runs: usize,
+    /// Median seconds, setup and compilation included.
+    pub seconds: f64,
+    /// Median seconds of rendering alone.
+    pub render: f64,
+    /// relRMSE: the root of the mean square over the runs, or the median where the variance is infinite;
+    /// `null` where the reference's own noise hides it.
+    pub error: Option<f64>,
+    /// The 5 % quantile of the runs' errors.
+    pub low: Option<f64>,
+    /// The 95 % quantile.
+    pub high: Option<f64>,
+    /// Mean square error; `null` where the variance is infinite.
+    pub mse: Option<f64>,
+    /// Mean relative error of the image's mean.
+    pub mean_error: f64,
+    /// Median of the errors that the renders estimate themselves.
+    pub estimated: Option<f64>,
 }
 
-fn plot(study: &Study, outcome: &Outcome, axis: Axis) -> Plot {
-    let rect = study.base.crop;
-    let runs = outcome
-        .analysis
-        .series
-        .iter()
-        .map(|s| s.runs)
-        .max()
-        .unwrap_or(0);
-    let x = |l: &Level| match axis {
-        Axis::Seconds => l.seconds,
-        Axis::Samples => l.spp as f64,
-    };
-    let curve = |s: &Summary| Curve {
-        label: s.label.clone(),
-        points: s
-            .levels
+/// MSE = b² + v/N.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Bias {
+    /// b², which may be negative: then it is 0 within its error.
+    pub b_squared: Interval,
+    /// b over the reference's mean; 0 where b² is negative.
+    pub b: f64,
+    /// The ends of b's interval over the reference's mean.
+    pub range: Option<[f64; 2]>,
+    /// v, the variance of a sample.
+    pub variance: f64,
+    /// Whether the interval excludes 0: the series is biased.
+    pub biased: Option<bool>,
+}
+
+/// The runs of one series.
+pub(super) struct Group<'a> {
+    pub(super) subject: Subject,
+    pub(super) runs: Vec<&'a Run>,
+    /// What the reference adds to all errors.
+    pub(super) noise: Noise,
+}
+
+impl Group<'_> {
+    fn infinite(&self) -> bool {
+        self.subject.variance == VarianceClass::Infinite
+    }
+
+    fn at(&self, run: usize, spp: u64) -> Option<&Point> {
+        self.runs[run].points.iter().find(|p| p.spp == spp)
+    }
+
+    fn start(&self, run: usize) -> f64 {
+        self.runs[run].setup + self.runs[run].compile
+    }
+
+    /// The values of a member of the chosen runs' points.
+    fn values(&self, chosen: &[usize], spp: u64, of: impl Fn(&Point) -> f64) -> Vec<f64> {
+        let found = chosen.iter().filter_map(|run| self.at(*run, spp));
+        found.map(of).collect()
+    }
+
+    fn mse(&self, chosen: &[usize], spp: u64) -> Option<f64> {
+        Some(mean(&self.values(chosen, spp, |p| p.mse))? - self.noise.mse)
+    }
+
+    fn error(&self, chosen: &[usize], spp: u64) -> Option<f64> {
+        let mut squares = self.values(chosen, spp, |p| p.relmse - self.noise.relmse);
+        let square = match self.infinite() {
+            true => median(&mut squares),
+            false => mean(&squares),
+        };
+        // What is within two standard errors of the reference's own noise is not known.
+        square
+            .filter(|s| *s > 2.0 * self.noise.relmse_error)
+            .map(f64::sqrt)
+    }
+
+    /// `reference` is the mean of the reference.
+    pub(super) fn summary(&self, label: String, reference: f64) -> Summary {
+        let all: Vec<usize> = (0..self.runs.len()).collect();
+        let levels = self.levels(&all);
+        // Where half of the runs came: what is beyond rests on those that were fast.
+        let shared: Vec<u64> = levels
             .iter()
-            .filter_map(|l| Some((x(l), l.error?)))
-            .collect(),
-        band: s
-            .levels
-            .iter()
-            .filter(|l| l.runs > 1)
-            .filter_map(|l| Some((x(l), l.low?, l.high?)))
-            .collect(),
-    };
-    let against = match axis {
-        Axis::Seconds => "time",
-        Axis::Samples => "samples",
-    };
-    let device = study
-        .identity
-        .gpu
-        .as_deref()
-        .map_or(String::new(), |gpu| format!(", {}", short(gpu)));
-    Plot {
-        title: format!("Error against {against}"),
-        subtitle: format!(
-            "{}, {}x{}, relRMSE of {runs} seed{}{device}",
-            study.loaded.name,
-            rect.width,
-            rect.height,
-            if runs == 1 { "" } else { "s" },
-        ),
-        x: axis,
-        curves: outcome.analysis.series.iter().map(curve).collect(),
-    }
-}
-
-/// A device's name without what stands in parentheses.
-fn short(name: &str) -> &str {
-    name.split(" (").next().unwrap_or(name)
-}
-
-fn report(
-    study: &Study,
-    store: &Store,
-    outcome: &Outcome,
-    pairs: &[Pair],
-    plots: &[Plot],
-    warnings: &[String],
-) -> Result<String> {
-    let analysis = &outcome.analysis;
-    let mut tables = vec![
-        tables::overview(analysis),
-        tables::equal_time(analysis),
-        tables::equal_error(analysis),
-        tables::laws(analysis),
-        tables::biases(analysis),
-    ];
-    tables.extend(tables::precision(pairs));
-    let galleries = [
-        shown(study, store, outcome),
-        equal_time(study, store, outcome),
-        precise(store, pairs),
-    ];
-    let report = Report {
-        title: format!("{}: {}", study.title, study.loaded.name),
-        lead: lead(outcome),
-        notices: notices(outcome)
-            .into_iter()
-            .chain(warnings.iter().cloned())
-            .collect(),
-        facts: facts(study, outcome),
-        plots,
-        tables: &tables,
-        galleries: &galleries,
-        reference: &outcome.picture,
-        exposure: study.exposure,
-        command: study.command.clone(),
-    };
-    report.html().map_err(|source| Error::File {
-        action: "cannot write",
-        path: store.path("report.html"),
-        source,
-    })
-}
-
-/// What reading the figures must not miss.
-#[must_use]
-pub fn notices(outcome: &Outcome) -> Vec<String> {
-    let mut said = Vec::new();
-    if !outcome.complete {
-        said.push(
-            "The study is not complete: the same command goes on. Images at equal time come at its end."
-                .to_owned(),
-        );
-    }
-    if outcome.complete && outcome.equal_time.is_empty() {
-        said.push(
-            "The images at equal time are not there: the same command renders them.".to_owned(),
-        );
-    }
-    if outcome.noise.is_none() {
-        said.push(
-            "The reference's own noise is unknown (its file has no standard errors): it is in all errors, \
-             curves flatten towards it, and b holds it."
-                .to_owned(),
-        );
-    }
-    let of = |class: VarianceClass| {
-        let series = outcome.analysis.series.iter();
-        let labels = series
-            .filter(|s| s.variance == class)
-            .map(|s| s.label.as_str());
-        Some(labels.collect::<Vec<_>>().join(", ")).filter(|text| !text.is_empty())
-    };
-    if let Some(labels) = of(VarianceClass::Infinite) {
-        said.push(format!(
-            "The variance may be infinite: {labels}. These errors are medians and quantiles over the runs; a mean \
-             over runs or a fit of variance would say nothing."
-        ));
-    }
-    if let Some(labels) = of(VarianceClass::HeavyTailed) {
-        said.push(format!(
-            "The samples have a heavy tail: {labels}. Few runs see its rarest values, and intervals may be too narrow."
-        ));
-    }
-    for s in outcome.analysis.series.iter().filter(|s| s.non_finite > 0) {
-        said.push(format!(
-            "{}: {} samples were no finite number; they are in no sum.",
-            s.label, s.non_finite
-        ));
-    }
-    said
-}
-
-fn facts(study: &Study, outcome: &Outcome) -> Vec<(&'static str, String)> {
-    let identity = &study.identity;
-    let rect = study.base.crop;
-    let noise = match outcome.noise {
-        Some(noise) => format!(
-            "its own error of {} is subtracted",
-            percent(noise.relmse.sqrt())
-        ),
-        None => "its own error is unknown".into(),
-    };
-    let reference = match &study.reference {
-        ReferenceChoice::File(input) => format!("{}; {noise}", input.path.display()),
-        ReferenceChoice::Own { series, spp, seed } => format!(
-            "{} {} on the {}, {spp} samples a pixel, at most {} bounces, seed {seed}; {noise}",
-            series.integrator.name(),
-            series.sampler.name(),
-            series.backend.name().to_uppercase(),
-            series.max_bounces
-        ),
-    };
-    let mut facts = vec![
-        (
-            "Scene",
-            format!("{} ({})", study.loaded.name, study.loaded.hash),
-        ),
-        ("Image", format!("{}x{} pixels", rect.width, rect.height)),
-        ("Reference", reference),
-        (
-            "Seeds",
-            format!(
-                "{} to {}",
-                study.seeds.start,
-                study.seeds.end.saturating_sub(1)
-            ),
-        ),
-    ];
-    if let Some(gpu) = &identity.gpu {
-        facts.push(("GPU", gpu.clone()));
-    }
-    facts.push((
-        "CPU threads",
-        match identity.threads {
-            0 => "one a core".into(),
-            n => n.to_string(),
-        },
-    ));
-    facts.push(("Program", format!("gpu-trace {}", identity.version)));
-    facts
-}
-
-fn shot(label: &str, caption: String, picture: Picture, against: &Picture) -> Shot {
-    Shot {
-        label: label.into(),
-        caption,
-        difference: HeatMap::of(&picture, against),
-        picture,
-    }
-}
-
-fn gallery(title: &str, note: &str, mut shots: Vec<Shot>, images: bool) -> Gallery {
-    align(&mut shots);
-    Gallery {
-        title: title.into(),
-        note: note.into(),
-        shots,
-        images,
-    }
-}
-
-fn shown(study: &Study, store: &Store, outcome: &Outcome) -> Gallery {
-    let mut shots = Vec::new();
-    let series: Vec<_> = study.subjects.iter().map(|s| s.series).collect();
-    for (series, label) in series.iter().zip(labels(&series)) {
-        let summary = outcome
-            .analysis
-            .series
-            .iter()
-            .find(|s| s.series == series.key());
-        for spp in &study.shown {
-            let level = summary.and_then(|s| s.levels.iter().find(|l| l.spp == *spp));
-            let image = store.image(&sample_image(series, study.seeds.start, *spp));
-            let Some((level, picture)) = level.zip(image) else {
-                continue;
-            };
-            let error = level
-                .error
-                .map_or("error unknown".into(), |e| format!("error {}", percent(e)));
-            let caption = format!("{error}, {}", tables::seconds(level.seconds));
-            let name = match series_count(study) {
-                1 => format!("{spp} samples a pixel"),
-                _ => format!("{label}, {spp} samples a pixel"),
-            };
-            shots.push(shot(&name, caption, picture, &outcome.picture));
+            .filter(|l| 2 * l.runs >= all.len())
+            .map(|l| l.spp)
+            .collect();
+        let last = shared.last().copied().unwrap_or_default();
+        let settled: Vec<u64> = shared.iter().copied().filter(|n| *n >= SETTLED).collect();
+        let fitted = if settled.len() >= 3 {
+            &settled
+        } else {
+            &shared
+        };
+        let slope_over = |chosen: &[usize], x: &dyn Fn(u64) -> Option<f64>| {
+            let point = |spp: &u64| Some((x(*spp)?, self.error(chosen, *spp)?));
+            let points: Vec<(f64, f64)> = fitted.iter().filter_map(point).collect();
+            slope(&points)
+        };
+        let render = |chosen: &[usize], spp| mean(&self.values(chosen, spp, |p| p.seconds));
+        let medians = |of: &dyn Fn(usize) -> f64| {
+            median(&mut all.iter().map(|r| of(*r)).collect::<Vec<f64>>()).unwrap_or_default()
+        };
+        Summary {
+            label,
+            series: self.subject.series.key(),
+            variance: self.subject.variance,
+            runs: self.runs.len(),
+            setup: medians(&|r| self.runs[r].setup),
+            compile: medians(&|r| self.runs[r].compile),
+            seconds_per_sample: median(&mut self.values(&all, last, |p| p.seconds))
+                .map_or(0.0, |s| s / last.max(1) as f64),
+            non_finite: self.runs.iter().map(|r| r.non_finite).sum(),
+            slope_spp: Interval::of(all.len(), |chosen| {
+                slope_over(chosen, &|spp| Some(spp as f64))
+            }),
+            slope_time: Interval::of(all.len(), |chosen| {
+                slope_over(chosen, &|spp| render(chosen, spp))
+            }),
+            bias: self.bias(&shared, reference),
+            efficiency: self.efficiency(last),
+            levels,
         }
     }
-    gallery(
-        "Images at growing numbers of samples",
-        "Each with the map of its relative error against the reference.",
-        shots,
-        true,
-    )
+
+    fn levels(&self, all: &[usize]) -> Vec<Level> {
+        let mut marks: Vec<u64> = self
+            .runs
+            .iter()
+            .flat_map(|r| &r.points)
+            .map(|p| p.spp)
+            .collect();
+        marks.sort_unstable();
+        marks.dedup();
+        let level = |spp: u64| {
+            let there: Vec<usize> = all
+                .iter()
+                .copied()
+                .filter(|r| self.at(*r, spp).is_some())
+                .collect();
+            let mut errors: Vec<f64> = there
+                .iter()
+                .filter_map(|r| self.error(&[*r], spp))
+                .collect();
+            errors.sort_by(f64::total_cmp);
+            let whole = |run: &usize| Some(self.start(*run) + self.at(*run, spp)?.seconds);
+            let mut wholes: Vec<f64> = there.iter().filter_map(whole).collect();
+            let mut estimates: Vec<f64> = there
+                .iter()
+                .filter_map(|r| self.at(*r, spp)?.estimated)
+                .collect();
+            Level {
+                spp,
+                runs: there.len(),
+                seconds: median(&mut wholes).unwrap_or_default(),
+                render: median(&mut self.values(&there, spp, |p| p.seconds)).unwrap_or_default(),
+                error: self.error(&there, spp),
+                low: quantile(&errors, 0.05),
+                high: quantile(&errors, 0.95),
+                mse: self.mse(&there, spp).filter(|_| !self.infinite()),
+                mean_error: mean(&self.values(&there, spp, |p| p.bias)).unwrap_or_default(),
+                estimated: median(&mut estimates).filter(|_| !self.infinite()),
+            }
+        };
+        marks.into_iter().map(level).collect()
+    }
+
+    fn bias(&self, levels: &[u64], reference: f64) -> Option<Bias> {
+        if self.infinite() {
+            return None;
+        }
+        let fit = |chosen: &[usize]| {
+            let mse = |n: &u64| Some((*n, self.mse(chosen, *n)?));
+            let points: Vec<(u64, f64)> = levels.iter().filter_map(mse).collect();
+            let scale: Vec<f64> = points.iter().map(|p| p.1 + self.noise.mse).collect();
+            bias_fit(self.subject.series.sampler, &points, &scale)
+        };
+        let all: Vec<usize> = (0..self.runs.len()).collect();
+        let variance = fit(&all)?.variance;
+        let b_squared = Interval::of(self.runs.len(), |chosen| {
+            fit(chosen).map(|f| f.bias_squared)
+        })?
+        .widened(self.noise.mse_error);
+        let root = |square: f64| square.max(0.0).sqrt() / reference;
+        Some(Bias {
+            b_squared,
+            b: root(b_squared.value),
+            range: b_squared.range.map(|r| r.map(root)),
+            variance,
+            biased: b_squared.range.map(|[low, _]| low > 0.0),
+        })
+    }
+
+    fn efficiency(&self, last: u64) -> Option<Interval> {
+        if self.infinite() {
+            return None;
+        }
+        Interval::of(self.runs.len(), |chosen| {
+            let there: Vec<usize> = chosen
+                .iter()
+                .copied()
+                .filter(|r| self.at(*r, last).is_some())
+                .collect();
+            let whole = |run: &usize| Some(self.start(*run) + self.at(*run, last)?.seconds);
+            let seconds = mean(&there.iter().filter_map(whole).collect::<Vec<f64>>())?;
+            let mse = self
+                .mse(&there, last)
+                .filter(|m| *m > 2.0 * self.noise.mse_error)?;
+            Some(1.0 / (mse * seconds))
+        })
+    }
 }
 
-fn series_count(study: &Study) -> usize {
-    study.subjects.len()
+impl Summary {
+    /// (seconds, relRMSE) of all levels; the error is unknown where the reference's noise hides it.
+    #[must_use]
+    pub fn over_time(&self) -> Vec<(f64, Option<f64>)> {
+        self.levels.iter().map(|l| (l.seconds, l.error)).collect()
+    }
+
+    /// The samples a pixel that are done after `seconds`, setup and compilation included.
+    #[must_use]
+    pub fn spp_at(&self, seconds: f64) -> Option<f64> {
+        let curve: Vec<(f64, Option<f64>)> = self
+            .levels
+            .iter()
+            .map(|l| (l.seconds, Some(l.spp as f64)))
+            .collect();
+        value_at(&curve, seconds)
+    }
 }
 
-fn equal_time(study: &Study, store: &Store, outcome: &Outcome) -> Gallery {
-    let series: Vec<_> = study.subjects.iter().map(|s| s.series).collect();
-    let names = labels(&series);
-    let time = outcome
-        .analysis
-        .equal_time
-        .last()
-        .map_or(0.0, |t| t.seconds);
-    let shots = outcome.equal_time.iter().filter_map(|(index, spp, name)| {
-        let picture = store.image(name)?;
-        let difference = crate::compare::Errors::of(&picture, &outcome.picture)?;
-        let caption = format!(
-            "{spp} spp, {} from the reference",
-            percent(difference.relrmse)
-        );
-        Some(shot(&names[*index], caption, picture, &outcome.picture))
-    });
-    gallery(
-        &format!("Images at equal time: {}", tables::seconds(time)),
-        "Setup and compilation included, each with as many samples as fit, and with the map of its relative \
-         error against the reference.",
-        shots.collect(),
-        true,
-    )
+fn mean(values: &[f64]) -> Option<f64> {
+    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
 }
 
-fn precise(store: &Store, pairs: &[Pair]) -> Gallery {
-    let shots = pairs.iter().filter_map(|pair| {
-        let (image, exact) = pair.last.as_ref()?;
-        let (image, exact) = (store.image(image)?, store.image(exact)?);
-        let level = pair.levels.last()?;
-        let caption = format!("{} spp, {} apart", level.spp, percent(level.relrmse));
-        Some(shot(&pair.label, caption, image, &exact))
-    });
-    gallery(
-        "f32 against f64, the same samples",
-        "Where the image of a series differs from that of the CPU in f64 without a nudge. Both have the same \
-         noise, so that this is precision and the nudge alone.",
-        shots.collect(),
-        false,
-    )
+fn median(values: &mut [f64]) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    quantile(values, 0.5)
 }

@@ -1,58 +1,15 @@
 //! The figures as tables of text, for the report and the terminal.
 
-use super::analysis::{Analysis, Summary};
+use super::analysis::Analysis;
 use super::bootstrap::Interval;
 use super::equal::{EqualError, EqualTime};
 use super::pictures::Pair;
-use crate::estimate::VarianceClass;
-use crate::output::numbers::{duration, percent, significant};
-
-/// A table.
-#[derive(Clone, Debug)]
-pub struct Table {
-    /// What it shows.
-    pub title: String,
-    /// How to read it, in a sentence or two.
-    pub note: String,
-    /// The columns' names; the first column has the series.
-    pub head: Vec<String>,
-    /// The rows, as long as the head.
-    pub rows: Vec<Vec<String>>,
-}
+use super::summary::Summary;
+use super::table::Table;
+use crate::numbers::{duration, percent, significant};
+use crate::variance::VarianceClass;
 
 const UNKNOWN: &str = "–";
-
-impl Table {
-    fn new(title: &str, note: &str, head: &[&str]) -> Self {
-        Self {
-            title: title.into(),
-            note: note.into(),
-            head: head.iter().map(|h| (*h).to_owned()).collect(),
-            rows: Vec::new(),
-        }
-    }
-
-    /// Columns of a terminal, the first one to the left and the others to the right.
-    #[must_use]
-    pub fn text(&self) -> String {
-        let lines: Vec<&Vec<String>> = std::iter::once(&self.head).chain(&self.rows).collect();
-        let length = |cell: &String| cell.chars().count();
-        let widths: Vec<usize> = (0..self.head.len())
-            .map(|i| lines.iter().map(|l| length(&l[i])).max().unwrap_or(0))
-            .collect();
-        let line = |cells: &&Vec<String>| {
-            let cells = cells.iter().zip(&widths).enumerate();
-            let cells: Vec<String> = cells
-                .map(|(i, (cell, width))| match i {
-                    0 => format!("{cell:<width$}"),
-                    _ => format!("{cell:>width$}"),
-                })
-                .collect();
-            cells.join("  ").trim_end().to_owned() + "\n"
-        };
-        lines.iter().map(line).collect()
-    }
-}
 
 /// Where each series came to.
 #[must_use]
@@ -342,10 +299,10 @@ mod tests {
     use super::*;
     use crate::sampler::Sampler;
     use crate::settings::{Integrator, Offset};
-    use crate::study::analysis::{Subject, analyse};
+    use crate::study::analysis::analyse;
     use crate::study::measure::Noise;
     use crate::study::run::{Point, Run};
-    use crate::study::series::{BackendKind, Series};
+    use crate::study::series::{BackendKind, Series, Subject};
 
     /// The time to 20 %, by series, of runs with these relRMSEs at 1, 2, 4, ... samples.
     fn times(errors: [&[f64]; 2], hidden: f64) -> [String; 2] {

@@ -2,7 +2,8 @@
 
 use std::time::{Duration, Instant};
 
-use super::conduct::{Host, Study};
+use super::host::Host;
+use super::plan::Study;
 use crate::output::Snapshot;
 
 /// A part of the work that is still to do.

@@ -9,7 +9,8 @@ use std::process::{Child, ChildStderr, Command, Output, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant, SystemTime};
 
-use gpu_trace::output::{Picture, read_npy};
+use gpu_trace::image::Picture;
+use gpu_trace::input::read;
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -175,7 +176,9 @@ impl Folder {
     }
 
     pub(crate) fn npy(&self, name: &str) -> Picture {
-        read_npy(&self.path(name)).unwrap_or_else(|e| panic!("{e}"))
+        read(&self.path(name))
+            .unwrap_or_else(|e| panic!("{e}"))
+            .picture
     }
 
     /// Renders with `arguments`; the picture and the statistics.

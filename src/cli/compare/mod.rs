@@ -13,9 +13,10 @@ use self::text::{figures, heading, legend};
 use super::format::percent;
 use super::{print, values};
 use crate::compare::{DEFAULT_PPD, HeatMap, Options, Report, check_same, compare};
-use crate::error::{Error, Result};
+use crate::error::{Action, Error, Result};
+use crate::image::Format;
 use crate::input::{Input, read};
-use crate::output::{Format, Target, atomic, check_all};
+use crate::output::{Target, atomic, check_all};
 
 pub(super) const AFTER_HELP: &str = "\
 Examples:
@@ -114,7 +115,7 @@ pub(super) fn run(args: &CompareArgs) -> Result<()> {
     let heat = target.map(|target| (target, HeatMap::of(&image.picture, &reference.picture)));
     if let Some((target, map)) = &heat {
         let bytes = map.encode().map_err(|source| Error::File {
-            action: "cannot write",
+            action: Action::Write,
             path: target.path.clone(),
             source,
         })?;

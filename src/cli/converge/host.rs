@@ -11,7 +11,7 @@ use crate::job::prepare;
 use crate::output::{Progress, Snapshot};
 use crate::scene::Scene;
 use crate::settings::Settings;
-use crate::study::conduct::{Host, Opened};
+use crate::study::host::{Host, Opened};
 use crate::study::series::Series;
 
 /// This machine.

@@ -14,8 +14,8 @@ use super::signals::Signals;
 use crate::error::{Error, Result};
 use crate::output::Progress;
 use crate::study::conduct::{Outcome, conduct};
+use crate::study::files::{self, lead};
 use crate::study::store::{RUNS, Store};
-use crate::study::summary::{self, lead};
 use crate::study::tables;
 
 /// Runs `converge`.
@@ -46,10 +46,10 @@ pub(super) fn run(args: &ConvergeArgs) -> Result<()> {
         )?;
         return Err(Error::Interrupted(signals.code().unwrap_or(1)));
     };
-    for notice in summary::notices(&outcome) {
+    for notice in files::notices(&outcome) {
         progress.warning(&notice);
     }
-    let written = summary::write(study, &store, &outcome, &warnings);
+    let written = files::write(study, &store, &outcome, &warnings);
     if let Some(failure) = outcome.failure {
         return Err(failed(failure, directory.clone()));
     }
@@ -70,6 +70,7 @@ fn failed(failure: Error, directory: PathBuf) -> Error {
     );
     match failure {
         Error::Gpu(text) => Error::Gpu(format!("{text}; {kept}")),
+        Error::DeviceLimit(text) => Error::DeviceLimit(format!("{text}; {kept}")),
         Error::NonFinite(text) => Error::NonFinite(format!("{text}; {kept}")),
         other => other,
     }

@@ -1,26 +1,26 @@
 //! From options to a study: everything is decided and checked before anything is rendered.
 
+use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::args::ConvergeArgs;
 use crate::backend::{Backend, BackendKind, LEAST_PIXEL_BYTES, check_memory};
 use crate::cli::choices::Wanted;
-use crate::error::{Error, Result};
+use crate::error::{Action, Error, Result};
+use crate::image::Format;
 use crate::input::{Input, read};
 use crate::job::prepare;
-use crate::output::Format;
 use crate::sampler::Sampler;
 use crate::scene::{Loaded, builtin};
 use crate::settings::{DEFAULT_TERMINATION, Integrator, Offset, Rect, Settings};
-use crate::study::analysis::Subject;
-use crate::study::conduct::Study;
-use crate::study::identity::{Identity, ReferenceIdentity, hash};
+use crate::study::identity::{Identity, ReferenceIdentity, hash, kernel_hash};
+use crate::study::plan::{ReferenceChoice, Study};
 use crate::study::presets::{Preset, preset};
-use crate::study::reference::ReferenceChoice;
 use crate::study::run::Length;
-use crate::study::series::{Series, product};
-use crate::study::store::Store;
+use crate::study::series::{Series, Subject, product};
+use crate::study::store::{Store, backend_of_reference};
 
 /// Longer side of an image where nobody says: errors are per pixel, and hardly depend on it.
 const SIDE: u32 = 160;
@@ -82,9 +82,13 @@ pub(super) fn plan(args: &ConvergeArgs, warnings: &mut Vec<String>) -> Result<Pl
     let backends = backends(args, preset, warnings)?;
     let series = series(args, &base, preset, &backends.kinds)?;
     let mut subjects = Vec::new();
+    let mut kernels = BTreeMap::new();
     for series in series {
         let settings = series.settings(&base, args.seed);
         let job = prepare(&loaded.scene, &settings)?;
+        if let Entry::Vacant(kernel) = kernels.entry(series.way()) {
+            kernel.insert(kernel_hash(&job)?);
+        }
         subjects.push(Subject {
             series,
             variance: job.variance().class,
@@ -113,8 +117,11 @@ pub(super) fn plan(args: &ConvergeArgs, warnings: &mut Vec<String>) -> Result<Pl
             own_reference(args, preset, &base, &subjects, spp, kind)
         }
     };
-    if let ReferenceChoice::Own { series, seed, .. } = &reference {
-        prepare(&loaded.scene, &series.settings(&base, *seed))?;
+    if let ReferenceChoice::Own { series, seed, .. } = &reference
+        && let Entry::Vacant(kernel) = kernels.entry(series.way())
+    {
+        let job = prepare(&loaded.scene, &series.settings(&base, *seed))?;
+        kernel.insert(kernel_hash(&job)?);
     }
     let rect = base.crop;
     let identity = Identity {
@@ -127,6 +134,7 @@ pub(super) fn plan(args: &ConvergeArgs, warnings: &mut Vec<String>) -> Result<Pl
         reference: reference_identity,
         threads: args.threads.map_or(0, usize::from),
         gpu: backends.gpu,
+        kernels,
     };
     let shown = preset.map_or(&[][..], |p| p.shown).iter().copied();
     Ok(Plan {
@@ -282,7 +290,7 @@ fn reference_backend(
     }
     let there = match args.fresh {
         true => None,
-        false => ReferenceIdentity::backend_in(directory),
+        false => backend_of_reference(directory),
     };
     match there.and_then(|name| BackendKind::of_name(&name)) {
         Some(kind) => kind,
@@ -371,7 +379,7 @@ fn reference_file(
         )));
     }
     let bytes = fs::read(path).map_err(|source| Error::File {
-        action: "cannot read",
+        action: Action::Read,
         path: path.to_owned(),
         source,
     })?;

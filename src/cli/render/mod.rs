@@ -17,11 +17,12 @@ use super::signals::Signals;
 use crate::backend::{Backend, BackendKind, LEAST_PIXEL_BYTES, check_memory};
 use crate::error::{Error, Result};
 use crate::gpu::device::Gpu;
+use crate::image::{Format, Picture};
 use crate::job::{Job, prepare};
 use crate::ledger::{self, Entry};
 use crate::output::stats::{Device, Seconds};
 use crate::output::{
-    Contents, Format, Layer, Picture, Plane, Progress, Stats, Target, atomic, check_all, write_all,
+    Contents, Layer, Plane, Progress, Stats, Target, atomic, check_all, write_all,
 };
 use crate::render::{Outcome, Renderer, StoppedBy, render};
 use crate::scene::builtin;

@@ -1,12 +1,12 @@
 //! The figures of a finished render.
 
 use crate::backend::BackendKind;
-use crate::estimate::energy_cut_at_most;
 use crate::job::Job;
 use crate::output::Stats;
 use crate::output::stats::{BounceLimit, Device, Seconds};
 use crate::render::Outcome;
 use crate::scene::load::Loaded;
+use crate::variance::energy_cut_at_most;
 
 /// All but what is known at the end: times, warnings, and the ledger.
 pub(super) fn statistics(

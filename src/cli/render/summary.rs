@@ -2,13 +2,13 @@
 
 use crate::cli::args::RenderArgs;
 use crate::cli::format::{percent, significant};
-use crate::estimate::VarianceClass;
 use crate::film::NonFinite;
 use crate::ledger::Entry;
 use crate::output::{Aov, Plane, Stats};
 use crate::placement::Placement;
 use crate::render::{Outcome, StoppedBy};
 use crate::settings::Settings;
+use crate::variance::VarianceClass;
 
 /// The line about a render at its end; `files` names its images.
 pub(super) fn summary(files: &str, stats: &Stats) -> String {

@@ -1,16 +1,16 @@
 //! `gpu-trace converge` from its options to its files.
 
+#[path = "../cli_support/mod.rs"]
 mod cli_support;
+mod shown;
 
 use std::collections::BTreeMap;
 use std::fs;
-use std::io::Write as _;
-use std::path::Path;
-use std::process::Command;
 
 use cli_support::{BLACK, Background, Folder, holds};
 use gpu_trace::input::read;
 use serde_json::{Value, json};
+use shown::{balanced, drawn, self_contained};
 
 /// Small enough for a second or two.
 const SMALL: &str = "good.toml --size 16x12 --spp 64 --seeds 4 --progress none";
@@ -61,11 +61,13 @@ fn a_study_leaves_what_it_promises() {
     );
 
     // 2 series, 4 seeds, 1 to 64 samples.
-    let csv = lines(&folder, "s/converge.csv");
-    assert_eq!(csv.len(), 1 + 2 * 4 * 7);
-    let columns: Vec<&str> = csv[0].split(',').collect();
+    let bytes = folder.read("s/converge.csv");
+    let mut csv = csv::Reader::from_reader(bytes.as_slice());
+    let columns = csv.headers().expect("names").clone();
+    let rows: Vec<csv::StringRecord> = csv.records().map(|row| row.expect("a row")).collect();
+    assert_eq!(rows.len(), 2 * 4 * 7);
     let column = |name: &str| {
-        let found = columns.iter().position(|c| *c == name);
+        let found = columns.iter().position(|c| c == name);
         found.unwrap_or_else(|| panic!("no column {name}"))
     };
     let study = folder.json("s/converge.json");
@@ -102,11 +104,10 @@ fn a_study_leaves_what_it_promises() {
     }
 
     // The measured error is what compare measures, of the image that render makes.
-    let row = csv
+    let row = rows
         .iter()
-        .map(|line| fields(line))
         .find(|cells| {
-            cells[0] == "bsdf" && cells[column("seed")] == "2" && cells[column("spp")] == "64"
+            &cells[0] == "bsdf" && &cells[column("seed")] == "2" && &cells[column("spp")] == "64"
         })
         .expect("a row");
     folder
@@ -139,6 +140,7 @@ fn a_study_leaves_what_it_promises() {
             "{svg}"
         );
         balanced(&svg);
+        drawn(&svg, 2).expect("every viewer shows it");
     }
     let html = String::from_utf8(folder.read("s/report.html")).expect("text");
     balanced(&html);
@@ -358,6 +360,34 @@ fn a_directory_of_another_study_is_refused_with_both_facts() {
     let run = folder.run(&format!("converge good.toml --spp 32 {base} --fresh"));
     assert_eq!(run.code, Some(0), "{run:?}");
     assert_eq!(lines(&folder, "s/runs.jsonl").len(), 2);
+    // A build whose kernel is another: that of the directory, or what it does not say.
+    let there = lines(&folder, "s/runs.jsonl");
+    let words = format!("converge good.toml --spp 32 {base}");
+    let words: Vec<&str> = words.split_whitespace().collect();
+    let mut identity: Value = serde_json::from_str(&there[0]).expect("JSON");
+    let kernel = identity["kernels"]["bsdf sobol exact 64"].take();
+    let kernel = kernel.as_str().expect("a hash");
+    identity["kernels"]["bsdf sobol exact 64"] = json!("0123");
+    folder.write("s/runs.jsonl", format!("{identity}\n{}\n", there[1]));
+    let text = folder.refused(&words);
+    let facts = format!("0123 there, {kernel} now");
+    holds(
+        &text,
+        &["another kernel for bsdf sobol exact 64", &facts, "--fresh"],
+    );
+    identity.as_object_mut().expect("members").remove("kernels");
+    folder.write("s/runs.jsonl", format!("{identity}\n{}\n", there[1]));
+    holds(
+        &folder.refused(&words),
+        &["did not say which kernels", "--fresh"],
+    );
+    folder.write("s/runs.jsonl", there.join("\n") + "\n");
+    folder.run(&words.join(" "));
+    assert_eq!(
+        lines(&folder, "s/runs.jsonl"),
+        there,
+        "a companion: the same kernel"
+    );
     // Damage is told by its line.
     folder.write(
         "s/runs.jsonl",
@@ -525,175 +555,4 @@ fn the_gpu_joins_a_study_of_the_cpu() {
     assert_eq!(study["runs"].as_array().map(Vec::len), Some(2));
     assert_eq!(study["study"]["reference"]["own"]["backend"], json!("cpu"));
     assert!(study["study"]["gpu"].is_string());
-}
-
-/// The fields of a line of CSV, of which some are quoted.
-fn fields(line: &str) -> Vec<String> {
-    let mut fields = vec![String::new()];
-    let mut quoted = false;
-    for character in line.chars() {
-        match character {
-            '"' => quoted = !quoted,
-            ',' if !quoted => fields.push(String::new()),
-            other => fields.last_mut().expect("one at least").push(other),
-        }
-    }
-    fields
-}
-
-/// That every element is closed, in order, as HTML and SVG want it.
-fn balanced(text: &str) {
-    const VOID: [&str; 4] = ["meta", "link", "img", "br"];
-    let mut open: Vec<&str> = Vec::new();
-    for tag in text.split('<').skip(1) {
-        let (inside, _) = tag.split_once('>').expect("every tag ends");
-        let name = inside.split([' ', '\n']).next().unwrap_or_default();
-        if let Some(name) = name.strip_prefix('/') {
-            assert_eq!(open.pop(), Some(name));
-        } else if !inside.ends_with('/') && !name.starts_with('!') && !VOID.contains(&name) {
-            open.push(name);
-        }
-    }
-    assert!(open.is_empty(), "{open:?}");
-}
-
-/// That nothing is fetched from anywhere.
-fn self_contained(html: &str) {
-    for what in [
-        "http:", "https:", "file:", "//", "@import", "<script", "url(",
-    ] {
-        let outside = html.split("base64,").enumerate().map(|(i, part)| match i {
-            // What follows is base64 up to the quote.
-            0 => part,
-            _ => part.split_once('"').map_or("", |(_, rest)| rest),
-        });
-        let found = outside.into_iter().find(|part| part.contains(what));
-        assert!(found.is_none(), "{what} in the report");
-    }
-    for source in html
-        .split("src=\"")
-        .skip(1)
-        .chain(html.split("href=\"").skip(1))
-    {
-        assert!(
-            source.starts_with("data:"),
-            "{}",
-            &source[..40.min(source.len())]
-        );
-    }
-}
-
-/// The browser, where one is installed.
-fn chromium() -> Option<&'static str> {
-    let names = [
-        "chromium",
-        "chromium-browser",
-        "google-chrome",
-        "google-chrome-stable",
-    ];
-    names.into_iter().find(|name| {
-        let version = Command::new(name).arg("--version").output();
-        version.is_ok_and(|output| output.status.success())
-    })
-}
-
-/// The report in a frame of 390 pixels, and what a script finds in there.
-fn probe(browser: &str, folder: &Path, report: &str) -> Value {
-    let framed = report.replace('&', "&amp;").replace('"', "&quot;");
-    let page = format!(
-        "<!doctype html><meta charset=utf-8><body style=\"margin:0\"><iframe id=f width=390 height=844 \
-         style=\"border:0\" srcdoc=\"{framed}\"></iframe><pre id=found></pre><script>\
-         const errors=[];f.contentWindow.addEventListener('error',e=>errors.push(String(e.message||e.target.src)),true);\
-         f.onload=()=>{{const d=f.contentDocument,w=f.contentWindow,r=d.documentElement;\
-         const text=[...d.querySelectorAll('svg text')].map(t=>t.getBoundingClientRect());\
-         const box=[...d.querySelectorAll('svg.plot')].map(s=>s.getBoundingClientRect());\
-         found.textContent='FOUND'+JSON.stringify({{width:w.innerWidth,scroll:r.scrollWidth,errors,\
-         images:d.images.length,loaded:[...d.images].filter(i=>i.complete&&i.naturalWidth>0).length,\
-         plots:box.length,labels:text.length,\
-         outside:text.filter(t=>t.right>390||t.left<0).length,\
-         smallest:Math.min(...text.map(t=>t.height))}})+'END'}};</script>"
-    );
-    let file = folder.join("frame.html");
-    fs::write(&file, page).expect("the folder can be written to");
-    let output = Command::new(browser)
-        .args([
-            "--headless=new",
-            "--no-sandbox",
-            "--disable-gpu",
-            "--dump-dom",
-            "--enable-logging=stderr",
-        ])
-        .arg("--virtual-time-budget=5000")
-        .arg(format!(
-            "--user-data-dir={}",
-            folder.join("profile").display()
-        ))
-        .arg(&file)
-        .output()
-        .expect("the browser starts");
-    let stderr = String::from_utf8_lossy(&output.stderr);
-    let console: Vec<&str> = stderr.lines().filter(|l| l.contains("CONSOLE")).collect();
-    assert!(console.is_empty(), "{console:?}");
-    let dom = String::from_utf8_lossy(&output.stdout).into_owned();
-    // The script itself has the word as well, further down.
-    let found = dom
-        .split("FOUND{")
-        .nth(1)
-        .and_then(|f| f.split("}END").next());
-    let found = found.map(|f| format!("{{{f}}}"));
-    let found = found.unwrap_or_else(|| panic!("the frame was not loaded: {stderr}"));
-    serde_json::from_str(&found).unwrap_or_else(|e| panic!("{e}: {found}"))
-}
-
-#[test]
-fn the_report_can_be_read_on_a_phone() {
-    let Some(browser) = chromium() else {
-        // Past the harness, which shows nothing of tests that pass.
-        let _ = writeln!(
-            std::io::stderr(),
-            "SKIPPED: no Chromium is installed, so that nothing has rendered the report of converge"
-        );
-        return;
-    };
-    let folder = Folder::with_scene();
-    let arguments = "--integrators bsdf,lecture --backends cpu -o s";
-    folder.run(&format!("converge {SMALL} {arguments}"));
-    let html = String::from_utf8(folder.read("s/report.html")).expect("text");
-    let found = probe(browser, &folder.path(""), &html);
-    assert_eq!(found["width"], json!(390), "{found}");
-    // A phone's scroll bar lies over the page, this one beside it.
-    assert!(
-        found["scroll"].as_u64() <= Some(390),
-        "it is wider than the phone: {found}"
-    );
-    assert_eq!(found["errors"], json!([]));
-    assert_eq!(
-        (&found["plots"], &found["outside"]),
-        (&json!(2), &json!(0)),
-        "{found}"
-    );
-    assert_eq!(found["images"], found["loaded"], "{found}");
-    assert!(
-        found["images"].as_u64() > Some(4) && found["labels"].as_u64() > Some(20),
-        "{found}"
-    );
-    assert!(
-        found["smallest"].as_f64() > Some(10.0),
-        "text too small to read: {found}"
-    );
-
-    // The companion: what is too wide, and an image that is none, are seen.
-    let spoilt = html
-        .replacen("<main>", "<main><p style=\"width:500px\">wide</p>", 1)
-        .replacen(
-            "data:image/png;base64,iVBOR",
-            "data:image/png;base64,AAAA",
-            1,
-        );
-    let found = probe(browser, &folder.path(""), &spoilt);
-    assert!(found["scroll"].as_u64() > Some(390), "{found}");
-    assert!(
-        found["loaded"].as_u64() < found["images"].as_u64(),
-        "{found}"
-    );
 }

@@ -6,7 +6,7 @@
 //! also adds degrees of freedom. Shrinking variances towards those of others is Smyth's moderated t
 //! (2004); that a quarter is right is measured: `docs/accuracy.md`.
 
-use crate::film::Film;
+use super::sums::Film;
 use crate::statistics::student_quantile;
 
 /// The share of the variance that is the mean over the neighbourhood, the pixel's own included.

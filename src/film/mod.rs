@@ -1,0 +1,26 @@
+//! The film: sums over all samples, and what they say.
+//!
+//! 1. [`window`]: what a renderer hands over; [`aov`]: what a pixel can hold beside its light.
+//! 2. [`allocation`]: how samples are shared out over the image.
+//! 3. [`sums`]: f64 sums and variances over all windows.
+//! 4. [`estimate`]: mean and error. [`intervals`]: those of single values. `adaptive`: where further
+//!    samples go.
+
+mod adaptive;
+pub mod allocation;
+pub mod aov;
+pub mod estimate;
+pub mod intervals;
+pub mod sums;
+pub mod window;
+
+pub use adaptive::PILOT_SAMPLES;
+pub use allocation::{Allocation, TILE, Tiles};
+pub use aov::{AovSums, LightClass};
+pub use estimate::Estimate;
+pub(crate) use estimate::UPPER;
+pub use intervals::half_widths;
+pub use sums::Film;
+pub use window::{
+    BLOCK, LEAST_SAMPLES, NonFinite, PixelSums, Tally, WINDOW, Window, next_look, window_end,
+};

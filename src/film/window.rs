@@ -1,0 +1,105 @@
+//! Windows: what a renderer sums up by itself, where they end, and what it counts.
+
+use std::ops::Range;
+
+use super::aov::AovSums;
+use crate::settings::Rect;
+
+/// Samples a block: f32 sums run over one block, and every batch, whose spread gives the error
+/// estimate, is some of them. The kernel's `BLOCK`.
+pub const BLOCK: u64 = 4;
+
+/// The largest window: what a renderer sums up by itself before the film gets it.
+pub const WINDOW: u64 = 256;
+
+/// The end of the window that starts at `start`, in a range that ends at `end`. Boundaries are at
+/// fixed sample indices (16, 64, 128, 256 and then every 256), so that no timing changes any sum.
+#[must_use]
+pub fn window_end(start: u64, end: u64) -> u64 {
+    let boundary = [16, 64, 128].into_iter().find(|b| start < *b);
+    let boundary = boundary.unwrap_or((start / WINDOW + 1).saturating_mul(WINDOW));
+    // A window's samples share the high word of the sample index.
+    boundary.min(end)
+}
+
+/// Samples below which no render stops by its error.
+pub const LEAST_SAMPLES: u64 = 64;
+
+/// The number of samples at which the error is looked at next, after a look at `samples`: an
+/// eighth more. Every look is a chance to stop by luck, so that there should be few; what that costs is a
+/// render that is a sixteenth too long on average, and more below 2048 samples, where windows are long.
+#[must_use]
+pub fn next_look(samples: u64) -> u64 {
+    LEAST_SAMPLES.max(samples.saturating_add(samples / 8))
+}
+
+/// One pixel's share of a window.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PixelSums {
+    /// Sum of the radiance of all samples, W/(sr m²) per channel.
+    pub sum: [f64; 3],
+    /// Sum of the squared deviations of the full batches' sums from their mean.
+    pub m2: [f64; 3],
+}
+
+/// What a renderer returns: sums over a range of samples for every pixel of a rectangle.
+#[derive(Clone, Debug)]
+pub struct Window {
+    /// The pixels, by rows.
+    pub rect: Rect,
+    /// The samples.
+    pub samples: Range<u64>,
+    /// Samples of a batch: all batches of a window are of one length.
+    pub batch: u64,
+    /// One entry a pixel, rows from the top; zeros where a tile was not asked for.
+    pub pixels: Vec<PixelSums>,
+    /// The same of what was asked for beside the image; empty if that is nothing.
+    pub aovs: Vec<AovSums>,
+    /// What else happened.
+    pub tally: Tally,
+}
+
+impl Window {
+    /// The number of batches that lie in the window as a whole.
+    #[must_use]
+    pub fn full_batches(&self) -> u64 {
+        (self.samples.end / self.batch).saturating_sub(self.samples.start.div_ceil(self.batch))
+    }
+}
+
+/// Counts over any set of samples.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Tally {
+    /// Rays traced.
+    pub rays: u64,
+    /// Paths that the bounce limit cut while they still carried light.
+    pub cut_paths: u64,
+    /// The throughput of these, averaged over the channels, summed.
+    pub cut_throughput: f64,
+    /// Samples that were no finite number; they are in no sum.
+    pub non_finite: u64,
+    /// The first of these.
+    pub first_non_finite: Option<NonFinite>,
+}
+
+impl Tally {
+    /// Adds the counts of further samples.
+    pub fn add(&mut self, other: &Self) {
+        self.rays += other.rays;
+        self.cut_paths += other.cut_paths;
+        self.cut_throughput += other.cut_throughput;
+        self.non_finite += other.non_finite;
+        self.first_non_finite = self.first_non_finite.or(other.first_non_finite);
+    }
+}
+
+/// Where a sample was no finite number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+pub struct NonFinite {
+    /// The pixel, in the whole image.
+    pub pixel: [u32; 2],
+    /// The sample index.
+    pub sample: u64,
+    /// The bounce after which it was seen.
+    pub bounce: u32,
+}
