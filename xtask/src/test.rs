@@ -55,6 +55,9 @@ const ONCE: [&str; 21] = [
 /// Of these only what the filter finds runs on every driver: devices that fail.
 const PARTLY: [(&str, &str); 1] = [("faults", "device")];
 
+/// That a test can fail, which its companion shows, is no matter of the driver either.
+const COMPANIONS: [&str; 2] = ["--skip", "companion"];
+
 /// These take longest, and so begin first.
 const LONGEST: [&str; 0] = [];
 
@@ -150,8 +153,11 @@ fn choose(tests: &[Tests], filters: &[String], elsewhere: bool) -> Vec<(Tests, V
             let part = PARTLY
                 .iter()
                 .find(|(name, _)| elsewhere && *name == tests.name);
-            let filter = part.map(|(_, filter)| (*filter).to_owned());
-            let filters = filters.iter().cloned().chain(filter).collect();
+            let mut filters = filters.to_vec();
+            if elsewhere {
+                filters.extend(part.map(|(_, filter)| (*filter).to_owned()));
+                filters.extend(COMPANIONS.map(String::from));
+            }
             (tests.clone(), filters)
         })
         .collect();
