@@ -59,7 +59,7 @@ const PARTLY: [(&str, &str); 1] = [("faults", "device")];
 const COMPANIONS: [&str; 2] = ["--skip", "companion"];
 
 /// These take longest, and so begin first.
-const LONGEST: [&str; 0] = [];
+const LONGEST: [&str; 3] = ["price", "check", "hazards"];
 
 /// What the program is asked on every driver after the tests.
 const COMMANDS: [&[&str]; 2] = [&["devices"], &["check", "--quick"]];
