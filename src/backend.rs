@@ -3,12 +3,12 @@
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
-use crate::film::AovSums;
+use crate::film::{self, AovSums, PixelSums};
 use crate::gpu::device::{self, DRIVER_ADVICE, DeviceChoice, Gpu};
 use crate::gpu::renderer::GpuRenderer;
 use crate::job::Job;
 use crate::numbers::significant;
-use crate::reference::renderer::ReferenceRenderer;
+use crate::reference::renderer::{self, ReferenceRenderer};
 use crate::render::Renderer;
 use crate::settings::{Rect, Settings};
 
@@ -109,7 +109,7 @@ impl Backend {
             Self::Gpu(gpu) => Box::new(GpuRenderer::new(Gpu::clone(gpu), job)?),
             Self::Cpu { threads } => Box::new(ReferenceRenderer::new(job, *threads)?),
         };
-        // After the driver has taken its part.
+        // After the driver and the threads have taken their part.
         check_memory(&settings.crop, self.pixel_bytes(settings))?;
         Ok(renderer)
     }
@@ -117,21 +117,24 @@ impl Backend {
     /// Bytes of this program's memory that a pixel takes in a render, at most.
     #[must_use]
     pub fn pixel_bytes(&self, settings: &Settings) -> usize {
-        let image = match self {
-            // 96 in the film, 48 in the window, and room for the files.
-            Self::Gpu(_) => LEAST_PIXEL_BYTES,
-            // The reference's sums in the middle of a window are larger.
-            Self::Cpu { .. } => 2 * LEAST_PIXEL_BYTES,
-        };
-        // The pilot has a film of its own.
-        let pilot = if settings.adaptive { 96 } else { 0 };
-        // In film, window and renderer, and in the files.
         let aovs = if settings.has_aovs() {
-            4 * size_of::<AovSums>()
+            size_of::<AovSums>()
         } else {
             0
         };
-        image + pilot + aovs
+        let window = size_of::<PixelSums>() + aovs;
+        // The pilot has a film of its own.
+        let films = if settings.adaptive { 2 } else { 1 };
+        let film = films * (film::PIXEL_BYTES + aovs);
+        let renderer = match self {
+            // A copy of what comes from the device, region by region.
+            Self::Gpu(_) => window,
+            // Boxed, with what the heap adds.
+            Self::Cpu { .. } if aovs > 0 => renderer::PIXEL_BYTES + aovs + 16,
+            Self::Cpu { .. } => renderer::PIXEL_BYTES,
+        };
+        let layers = if aovs > 0 { MOST_LAYERS } else { FEWEST_LAYERS };
+        film + (window + renderer).max(file_bytes(layers))
     }
 }
 
@@ -148,15 +151,35 @@ pub fn open_gpu(named: Option<&str>) -> Result<Gpu> {
     })
 }
 
-/// What a pixel takes on any device.
-pub const LEAST_PIXEL_BYTES: usize = 176;
+/// Values of a pixel in layers that take no sums of their own: `stderr` and `samples`.
+const FEWEST_LAYERS: usize = 4;
+/// The same of all layers: five kinds of light, normal, albedo and depth as well.
+const MOST_LAYERS: usize = FEWEST_LAYERS + 5 * 3 + 3 + 3 + 1;
+
+/// What a pixel takes while files are written, one by one: picture and layers; in the EXR encoder the
+/// same by channels; and the file, whose bytes grow by doubling and may not compress.
+const fn file_bytes(layers: usize) -> usize {
+    4 * (3 + layers) * (1 + 1 + 2)
+}
+
+/// What a pixel takes on any device: in the film, and in the files.
+pub const LEAST_PIXEL_BYTES: usize = film::PIXEL_BYTES + file_bytes(FEWEST_LAYERS);
+
+/// What a render takes whatever its size: the stacks of the threads that compress EXR files, one a core,
+/// and what all small things come to.
+fn fixed_bytes() -> usize {
+    const STACK: usize = (2 << 20) + (1 << 16);
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    (16 << 20) + cores * STACK
+}
 
 /// Refuses an image that would end the program in the middle for want of memory.
 ///
 /// # Errors
-/// [`Error::Usage`] if there is less than `pixel_bytes` for each pixel of `crop`.
+/// [`Error::Usage`] if there is less than `pixel_bytes` for each pixel of `crop`, and what any image takes.
 pub fn check_memory(crop: &Rect, pixel_bytes: usize) -> Result<()> {
     let bytes = crop.pixels().saturating_mul(pixel_bytes);
+    let bytes = bytes.saturating_add(fixed_bytes());
     let mut room: Vec<u8> = Vec::new();
     let there = room.try_reserve_exact(bytes).is_ok();
     // Without this, the compiler may leave the allocation out and assume that it works.

@@ -508,10 +508,12 @@ fn whichever_rule_comes_first_ends_the_render() {
         let stats = folder.json("r.json");
         assert_eq!(stats["stopped_by"], json!(stopped_by), "{options}: {stats}");
         holds(&summary, &[said]);
-        let error = stats["estimated_error"]
-            .as_f64()
-            .expect("at least 64 samples");
-        assert!(stopped_by != "error" || error <= 0.3, "{options}: {stats}");
+        let error = stats["estimated_error"].as_f64();
+        // A busy machine may take less in the time.
+        let known = stats["spp"].as_u64() >= Some(64);
+        assert_eq!(error.is_some(), known, "{options}: {stats}");
+        let reached = error.is_some_and(|error| error <= 0.3);
+        assert!(stopped_by != "error" || reached, "{options}: {stats}");
         let seconds = stats["seconds"]["render"].as_f64().expect("a number");
         assert!(stopped_by != "time" || seconds >= 0.3, "{options}: {stats}");
     }

@@ -9,6 +9,7 @@ mod devices;
 mod effects;
 mod fault;
 mod format;
+mod heap;
 mod price;
 mod render;
 mod scene;
@@ -120,6 +121,7 @@ enum SceneCommand {
 /// Runs the program on the process's arguments; returns the exit code.
 #[must_use]
 pub fn main() -> u8 {
+    heap::share();
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(error) => {

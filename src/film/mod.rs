@@ -21,6 +21,7 @@ pub use estimate::Estimate;
 pub(crate) use estimate::UPPER;
 pub use intervals::half_widths;
 pub use sums::Film;
+pub(crate) use sums::PIXEL_BYTES;
 pub use window::{
     BLOCK, LEAST_SAMPLES, NonFinite, PixelSums, Tally, WINDOW, Window, next_look, window_end,
 };

@@ -20,6 +20,9 @@ pub struct Film {
     paths: u64,
 }
 
+/// Bytes that a film keeps of a pixel, sums beside the image aside: two halves of two sums.
+pub const PIXEL_BYTES: usize = 2 * 2 * size_of::<[f64; 3]>();
+
 /// The sums over some of the windows, by pixel.
 #[derive(Clone, Debug)]
 struct Half {

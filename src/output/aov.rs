@@ -107,17 +107,20 @@ impl Plane {
     #[must_use]
     pub fn of(aov: Aov, film: &Film, estimate: &Estimate) -> Self {
         let pixels = 0..film.rect().pixels();
-        let values = match aov {
+        // Of known length, so that no room is left over.
+        let mut values = Vec::with_capacity(aov.channels().len() * pixels.len());
+        match aov {
             Aov::Stderr if Self::stderr_unknown(film, estimate) => {
-                vec![f32::NAN; 3 * film.rect().pixels()]
+                values.resize(3 * pixels.len(), f32::NAN);
             }
-            Aov::Stderr => pixels
-                .flat_map(|i| film.variance_of_mean(i).unwrap_or([f64::NAN; 3]))
-                .map(|v| v.sqrt() as f32)
-                .collect(),
-            Aov::Samples => pixels.map(|i| film.samples_of(i) as f32).collect(),
-            _ => pixels.flat_map(|i| aov.means(film, i)).collect(),
-        };
+            Aov::Stderr => values.extend(
+                pixels
+                    .flat_map(|i| film.variance_of_mean(i).unwrap_or([f64::NAN; 3]))
+                    .map(|v| v.sqrt() as f32),
+            ),
+            Aov::Samples => values.extend(pixels.map(|i| film.samples_of(i) as f32)),
+            _ => values.extend(pixels.flat_map(|i| aov.means(film, i))),
+        }
         Self { aov, values }
     }
 

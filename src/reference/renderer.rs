@@ -55,6 +55,9 @@ impl ReferenceRenderer {
     }
 }
 
+/// Bytes that a pixel takes in the middle of a window, sums beside the image aside.
+pub(crate) const PIXEL_BYTES: usize = size_of::<PixelState>();
+
 /// One pixel's sums in the middle of a window.
 #[derive(Clone, Debug, Default)]
 struct PixelState {
@@ -175,10 +178,14 @@ impl Renderer for ReferenceRenderer {
             rect: crop,
             samples: samples.start..start,
             batch: self.settings.sampler.batch(samples.start),
-            aovs: state
-                .iter()
-                .filter_map(|s| s.aovs.as_deref().copied())
-                .collect(),
+            aovs: match self.settings.has_aovs() {
+                // Of known length, so that no room is left over.
+                true => state
+                    .iter()
+                    .map(|s| s.aovs.as_deref().copied().unwrap_or_default())
+                    .collect(),
+                false => Vec::new(),
+            },
             pixels: state.into_iter().map(|s| s.sums).collect(),
             tally,
         })

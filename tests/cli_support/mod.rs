@@ -215,6 +215,8 @@ impl Background {
     /// Starts a command of which stdout and stderr are read here.
     pub(crate) fn of(mut command: Command) -> Self {
         command.stdout(Stdio::piped()).stderr(Stdio::piped());
+        #[cfg(unix)]
+        hear_signals(&mut command);
         let mut child = command.spawn().expect("the program starts");
         let stderr = BufReader::new(child.stderr.take().expect("a pipe"));
         Self { child, stderr }
@@ -265,6 +267,23 @@ impl Background {
             stdout,
             stderr,
         })
+    }
+}
+
+/// Makes the process hear the signals of tests, though these may run where they are ignored: whatever a
+/// shell starts in the background ignores SIGINT, and `nohup` SIGHUP.
+#[cfg(unix)]
+#[expect(unsafe_code, reason = "a system call between fork and exec")]
+fn hear_signals(command: &mut Command) {
+    use std::os::unix::process::CommandExt as _;
+    // SAFETY: signal(2) may be called after a fork, and no memory is touched.
+    unsafe {
+        command.pre_exec(|| {
+            for signal in [libc::SIGINT, libc::SIGTERM, libc::SIGHUP] {
+                libc::signal(signal, libc::SIG_DFL);
+            }
+            Ok(())
+        });
     }
 }
 

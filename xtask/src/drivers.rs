@@ -40,6 +40,14 @@ pub(crate) struct Driver {
 }
 
 impl Driver {
+    /// Whatever the system has.
+    pub(crate) fn system() -> Self {
+        Self {
+            name: "system",
+            variables: Vec::new(),
+        }
+    }
+
     /// Makes `command` run on this driver.
     pub(crate) fn choose<'a>(&self, command: &'a mut Command) -> &'a mut Command {
         command
@@ -77,7 +85,7 @@ pub(crate) fn first() -> Result<(Driver, bool), String> {
         return Ok((driver("environment", Vec::new()), true));
     }
     if !cfg!(target_os = "linux") {
-        return Ok((driver("system", Vec::new()), true));
+        return Ok((Driver::system(), true));
     }
     let find = || LAVAPIPE.iter().find(|path| Path::new(path).exists());
     if find().is_none() {

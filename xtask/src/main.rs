@@ -3,8 +3,10 @@
 mod bench;
 mod drivers;
 mod forecasts;
+mod lints;
 mod numerics;
 mod soak;
+mod suite;
 mod test;
 
 use std::path::{Path, PathBuf};
@@ -17,6 +19,7 @@ Usage: cargo xtask TASK
            every driver that is there (--help for its options)
   bench    run the benchmarks side by side and print their table (--help for its options)
   numerics run `gpu-trace check` on every driver that is there, into the table of docs/numerics.md
+           (--help for its options)
   soak     render for 30 minutes, or as many as are named, and fail if memory grows
 ";
 
@@ -26,7 +29,7 @@ fn main() -> ExitCode {
     let rest: Vec<String> = arguments.collect();
     let done = match task.as_deref() {
         Some("test") => test::all(&rest),
-        Some("numerics") => numerics::all(),
+        Some("numerics") => numerics::all(&rest),
         Some("bench") => bench::all(&rest),
         Some("soak") => soak::all(&rest),
         Some("help" | "--help" | "-h") => {

@@ -1,227 +1,217 @@
 //! `cargo xtask test`: everything that must hold, on a fresh machine, on every driver that is there.
 
-use std::fs;
-use std::io::{BufRead as _, BufReader};
-use std::process::{Command, Stdio};
+use std::process::Command;
 use std::time::Instant;
 
 use crate::drivers::{Driver, Optional, first};
-use crate::{cargo, program, root, run};
+use crate::suite::{self, Count, Part, Tests};
+use crate::{lints, program};
 
 const USAGE: &str = "\
-Usage: cargo xtask test [--drivers] [ARGUMENTS OF CARGO TEST...]
+Usage: cargo xtask test [--all] [--drivers] [ARGUMENTS OF CARGO TEST...] [-- ARGUMENTS OF THE TESTS...]
 
 Format, lints, documentation; all tests on Mesa lavapipe, which is installed if need be; then those
-that open a GPU on SwiftShader and on llvmpipe through GL, where these are there. Where the
-environment names a driver (VK_ICD_FILENAMES, VK_DRIVER_FILES, WGPU_BACKEND), on that alone.
+that another driver may answer differently on SwiftShader and on llvmpipe through GL, where these are
+there. Where the environment names a driver (VK_ICD_FILENAMES, VK_DRIVER_FILES, WGPU_BACKEND), on that
+alone.
 
+  --all       the long forms of the tests, and all of them on every driver
   --drivers   install the drivers that are missing; it is an error if one cannot be
 
-Further arguments choose tests: the same on every driver.
+Further arguments choose tests, the same on every driver: `--test faults -- memory`, say.
 ";
 
-/// Tests that open no GPU: once is enough. All other files of `tests/` run on every driver.
-const WITHOUT_GPU: [&str; 3] = ["effects", "output", "scene"];
+/// Set to 1 for tests that have a long form.
+const LONG_FORMS: &str = "GPU_TRACE_TEST_ALL";
 
-/// What the program is asked on every driver after the tests: each must exit with 0.
+/// Tests that one driver answers for all: those that open no GPU; those of files, options, processes and
+/// studies, to which a GPU is one like another; and those of light transport, whose formulas are asked
+/// on every driver by the others, one by one (`functions`, `materials`, `check`) and in whole images
+/// (`agreement`, `hazards`). All other files of `tests/` run on every driver.
+const ONCE: [&str; 21] = [
+    "cli",
+    "cli_commands",
+    "cli_errors",
+    "cli_process",
+    "compare",
+    "containment",
+    "converge",
+    "coverage",
+    "distribution",
+    "effects",
+    "furnace",
+    "fuzz",
+    "gpu_trace",
+    "input",
+    "ledger",
+    "output",
+    "price",
+    "references",
+    "scene",
+    "variance_law",
+    "xtask",
+];
+
+/// Of these only what the filter finds runs on every driver: devices that fail.
+const PARTLY: [(&str, &str); 1] = [("faults", "device")];
+
+/// That a test can fail, which its companion shows, is no matter of the driver either.
+const COMPANIONS: [&str; 2] = ["--skip", "companion"];
+
+/// These take longest, and so begin first.
+const LONGEST: [&str; 3] = ["price", "check", "hazards"];
+
+/// What the program is asked on every driver after the tests.
 const COMMANDS: [&[&str]; 2] = [&["devices"], &["check", "--quick"]];
+/// The file `check` of the tests has all cases, so that one shows that the program has them too.
+const ONE_CASE: [&str; 2] = ["--case", "35"];
 
-/// What a driver has come to.
-struct Part {
-    driver: &'static str,
-    adapter: String,
-    passed: u64,
-    failed: u64,
-    seconds: f64,
-    /// Why it has not held.
-    fault: Option<String>,
-}
-
-/// Runs the tests; further arguments go to `cargo test`.
+/// Runs the tests that `arguments` choose.
+///
+/// # Errors
+/// Whatever does not hold.
 pub(crate) fn all(arguments: &[String]) -> Result<(), String> {
+    let begin = Instant::now();
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
     // What comes after `--` is the test harness's.
-    let ours = arguments.split(|a| a == "--").next().unwrap_or_default();
-    if ours.iter().any(|a| a == "--help" || a == "-h") {
+    let end = arguments.iter().position(|a| *a == "--");
+    let (ours, filters) = arguments.split_at(end.unwrap_or(arguments.len()));
+    if ours.iter().any(|a| *a == "--help" || *a == "-h") {
         print!("{USAGE}");
         return Ok(());
     }
-    let install = ours.iter().any(|a| a == "--drivers");
-    let arguments: Vec<&str> = arguments
-        .iter()
-        .map(String::as_str)
-        .filter(|a| *a != "--drivers")
-        .collect();
-    let (driver, alone) = first()?;
-    lints()?;
-    // Separate, so that what follows takes the time of the tests.
-    run(cargo().args(["test", "--workspace", "--no-run"]))?;
+    let has = |option: &str| ours.contains(&option);
+    let (long, install) = (has("--all"), has("--drivers"));
+    let mut chosen = ours.to_vec();
+    chosen.retain(|a| !["--all", "--drivers"].contains(a));
+    if chosen.first().is_some_and(|a| !a.starts_with('-')) {
+        return Err(format!("parts of names of tests come after `--`\n{USAGE}"));
+    }
+    let filters: Vec<String> = filters.iter().skip(1).map(|a| (*a).to_owned()).collect();
 
+    let (driver, alone) = first()?;
+    lints::all()?;
+    let tests = match chosen[..] {
+        [] => suite::build(&["--workspace"])?,
+        _ => suite::build(&chosen)?,
+    };
     let adapter = driver
         .adapter()
         .ok_or_else(|| format!("the program finds no usable adapter on {}", driver.name))?;
-    let mut parts = vec![on(&driver, adapter, &["--workspace".into()], &arguments)];
+    let part = |driver, adapter, elsewhere| Part {
+        commands: commands(long),
+        tests: choose(&tests, &filters, elsewhere),
+        driver,
+        adapter,
+    };
+    // Who chooses tests gets just these.
+    let elsewhere = !long && chosen.is_empty() && filters.is_empty();
+    let mut parts = vec![part(driver, adapter, false)];
     let mut missing = Vec::new();
     for optional in Optional::ALL.into_iter().filter(|_| !alone) {
-        let mut found = optional.find();
-        let mut why = "`cargo xtask test --drivers` installs it".to_owned();
-        if found.is_none() && install {
-            if let Err(error) = optional.install() {
-                why = error;
-            } else {
-                why = "the program finds no usable adapter".into();
-                found = optional.find();
-            }
-        }
-        match found {
-            Some((driver, adapter)) => {
-                let chosen = if arguments.is_empty() {
-                    with_gpu()?
-                } else {
-                    vec!["--workspace".into()]
-                };
-                parts.push(on(&driver, adapter, &chosen, &arguments));
-            }
-            None => {
+        match there(optional, install) {
+            Ok((driver, adapter)) => parts.push(part(driver, adapter, elsewhere)),
+            Err(why) => {
                 eprintln!("no tests on {}: {why}", optional.name());
                 missing.push((optional.name(), why));
             }
         }
     }
-    summarize(&parts, &missing, install)
+    let named: Vec<(&'static str, String)> = parts
+        .iter()
+        .map(|part| (part.driver.name, part.adapter.clone()))
+        .collect();
+    let environment = long.then_some((LONG_FORMS, "1"));
+    let counts = suite::run(parts, environment);
+    summarize(
+        &named,
+        counts,
+        &missing,
+        install,
+        begin.elapsed().as_secs_f64(),
+    )
 }
 
-/// What needs no driver.
-fn lints() -> Result<(), String> {
-    // Components that a minimal toolchain may lack are checked where they are there.
-    if has("fmt") {
-        run(cargo().args(["fmt", "--all", "--check"]))?;
+/// The driver and its adapter; else why there is none.
+fn there(optional: Optional, install: bool) -> Result<(Driver, String), String> {
+    let found = optional.find();
+    if found.is_none() && install {
+        optional.install()?;
+        return optional
+            .find()
+            .ok_or_else(|| "the program finds no usable adapter".into());
     }
-    if has("clippy") {
-        run(cargo().args([
-            "clippy",
-            "--workspace",
-            "--all-targets",
-            "--",
-            "-D",
-            "warnings",
-        ]))?;
-    }
-    run(cargo()
-        .args(["doc", "--no-deps", "--quiet"])
-        .env("RUSTDOCFLAGS", "-D warnings"))
+    found.ok_or_else(|| "`cargo xtask test --drivers` installs it".into())
 }
 
-/// Whether `cargo NAME` is installed.
-fn has(name: &str) -> bool {
-    cargo()
-        .args([name, "--version"])
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .status()
-        .is_ok_and(|status| status.success())
+/// What of `tests` runs on a driver, the longest first; `elsewhere`: on one that is not the first.
+fn choose(tests: &[Tests], filters: &[String], elsewhere: bool) -> Vec<(Tests, Vec<String>)> {
+    let mut chosen: Vec<(Tests, Vec<String>)> = tests
+        .iter()
+        .filter(|tests| !elsewhere || !ONCE.contains(&tests.name.as_str()))
+        .map(|tests| {
+            let part = PARTLY
+                .iter()
+                .find(|(name, _)| elsewhere && *name == tests.name);
+            let mut filters = filters.to_vec();
+            if elsewhere {
+                filters.extend(part.map(|(_, filter)| (*filter).to_owned()));
+                filters.extend(COMPANIONS.map(String::from));
+            }
+            (tests.clone(), filters)
+        })
+        .collect();
+    let rank = |name: &str| LONGEST.iter().position(|l| *l == name);
+    chosen.sort_by_key(|(tests, _)| rank(&tests.name).unwrap_or(LONGEST.len()));
+    chosen
 }
 
-/// Arguments of `cargo test` that choose the tests that open a GPU.
-fn with_gpu() -> Result<Vec<String>, String> {
-    let folder = root().join("tests");
-    let failed = |error: std::io::Error| format!("{}: {error}", folder.display());
-    let mut names = Vec::new();
-    for entry in fs::read_dir(&folder).map_err(failed)? {
-        let path = entry.map_err(failed)?.path();
-        let name = path
-            .file_stem()
-            .and_then(|n| n.to_str())
-            .unwrap_or_default();
-        if path.extension().is_some_and(|e| e == "rs") && !WITHOUT_GPU.contains(&name) {
-            names.push(name.to_owned());
-        }
-    }
-    names.sort();
-    let tests = names.into_iter().flat_map(|n| ["--test".into(), n]);
-    Ok(["--package".into(), "gpu-trace".into()]
-        .into_iter()
-        .chain(tests)
-        .collect())
-}
-
-/// Runs the tests that `chosen` and `arguments` say, and the program's commands, on `driver`.
-fn on(driver: &Driver, adapter: String, chosen: &[String], arguments: &[&str]) -> Part {
-    println!("\n=== {}: {adapter}", driver.name);
-    let before = Instant::now();
-    let mut part = Part {
-        driver: driver.name,
-        adapter,
-        passed: 0,
-        failed: 0,
-        seconds: 0.0,
-        fault: None,
-    };
-    let mut tests = cargo();
-    tests
-        .args(["test", "--no-fail-fast"])
-        .args(chosen)
-        .args(arguments);
-    part.fault = counted(driver.choose(&mut tests), &mut part).err();
-    for arguments in COMMANDS {
+fn commands(long: bool) -> Vec<Command> {
+    let all = COMMANDS.iter().map(|arguments| {
         let mut command = Command::new(program("debug"));
-        if let Err(error) = run(driver.choose(command.args(arguments))) {
-            part.fault.get_or_insert(error);
+        command.args(*arguments);
+        if !long && arguments.contains(&"check") {
+            command.args(ONE_CASE);
         }
-    }
-    part.seconds = before.elapsed().as_secs_f64();
-    part
+        command
+    });
+    all.collect()
 }
 
-/// Runs `tests`, shows what they write and counts what they say.
-fn counted(tests: &mut Command, part: &mut Part) -> Result<(), String> {
-    let mut child = tests
-        .stdout(Stdio::piped())
-        .spawn()
-        .map_err(|error| format!("cargo test: {error}"))?;
-    let output = child.stdout.take().into_iter();
-    for line in output.flat_map(|o| BufReader::new(o).split(b'\n')) {
-        let line = line.map_err(|error| format!("cargo test: {error}"))?;
-        let line = String::from_utf8_lossy(&line);
-        println!("{line}");
-        if let Some(result) = line.strip_prefix("test result: ") {
-            part.passed += count(result, "passed");
-            part.failed += count(result, "failed");
-        }
-    }
-    match child.wait() {
-        Ok(status) if status.success() => Ok(()),
-        Ok(status) => Err(format!("cargo test: {status}")),
-        Err(error) => Err(format!("cargo test: {error}")),
-    }
-}
-
-/// The number before `word`, as in `ok. 9 passed; 0 failed`.
-fn count(result: &str, word: &str) -> u64 {
-    let words: Vec<&str> = result.split([' ', ';']).collect();
-    let number = words.windows(2).find(|pair| pair[1] == word);
-    number.and_then(|pair| pair[0].parse().ok()).unwrap_or(0)
-}
-
-/// The table of all drivers; an error if one of them has not held, or is missing though `wanted`.
-fn summarize(parts: &[Part], missing: &[(&str, String)], wanted: bool) -> Result<(), String> {
+/// The table of all drivers, and a line as the test harness has it; an error if a driver has not held,
+/// or is missing though `wanted`.
+fn summarize(
+    parts: &[(&str, String)],
+    counts: Vec<Count>,
+    missing: &[(&str, String)],
+    wanted: bool,
+    seconds: f64,
+) -> Result<(), String> {
     println!("\ndriver        passed  failed  seconds  adapter");
-    for part in parts {
+    for ((driver, adapter), count) in parts.iter().zip(&counts) {
         println!(
-            "{:<12}  {:>6}  {:>6}  {:>7.0}  {}",
-            part.driver, part.passed, part.failed, part.seconds, part.adapter
+            "{driver:<12}  {:>6}  {:>6}  {:>7.0}  {adapter}",
+            count.passed, count.failed, count.seconds
         );
     }
     for (name, why) in missing {
         println!("{name:<12}       -       -        -  not there: {why}");
     }
-    println!();
-    let mut faults: Vec<String> = parts
-        .iter()
-        .filter_map(|part| Some(format!("{}: {}", part.driver, part.fault.as_ref()?)))
-        .collect();
+    let mut faults: Vec<String> = counts.iter().flat_map(|c| c.faults.clone()).collect();
     if wanted {
         faults.extend(missing.iter().map(|(name, why)| format!("{name}: {why}")));
     }
+    let mut all = Count::default();
+    counts.into_iter().for_each(|count| all.add(count));
+    println!(
+        "\ntest result: {}. {} passed; {} failed; {} ignored; 0 measured; {} filtered out; finished in \
+         {seconds:.2}s\n",
+        if faults.is_empty() { "ok" } else { "FAILED" },
+        all.passed,
+        all.failed,
+        all.ignored,
+        all.filtered,
+    );
     if faults.is_empty() {
         Ok(())
     } else {
@@ -231,12 +221,22 @@ fn summarize(parts: &[Part], missing: &[(&str, String)], wanted: bool) -> Result
 
 #[cfg(test)]
 mod tests {
-    use super::count;
+    use super::{LONGEST, ONCE, PARTLY};
+    use crate::root;
+
+    /// A name that no file has any more would choose nothing, in silence.
+    #[test]
+    fn all_names_are_there() {
+        let partly = PARTLY.iter().map(|(name, _)| name);
+        for name in ONCE.iter().chain(partly).chain(&LONGEST) {
+            let file = root().join("tests").join(name).with_extension("rs");
+            let own = ["gpu_trace", "xtask"].contains(name);
+            assert!(own || file.exists(), "{name}");
+        }
+    }
 
     #[test]
-    fn results_are_counted() {
-        let result = "FAILED. 12 passed; 3 failed; 0 ignored; 0 measured; 0 filtered out";
-        assert_eq!((count(result, "passed"), count(result, "failed")), (12, 3));
-        assert_eq!(count("something else", "passed"), 0);
+    fn names_are_in_order() {
+        assert!(ONCE.is_sorted());
     }
 }

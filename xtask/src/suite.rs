@@ -1,0 +1,276 @@
+//! The executables of the tests: which there are, and running them side by side.
+
+use std::collections::VecDeque;
+use std::io::{BufRead as _, BufReader, Write as _};
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
+use std::sync::{Mutex, PoisonError};
+use std::time::Instant;
+
+use serde_json::Value;
+
+use crate::cargo;
+use crate::drivers::Driver;
+
+/// An executable of tests.
+#[derive(Clone, Debug)]
+pub(crate) struct Tests {
+    /// The name of its file in `tests/`, or of the crate whose own tests it has.
+    pub(crate) name: String,
+    program: PathBuf,
+    /// The folder of its package, where cargo runs it.
+    folder: PathBuf,
+}
+
+/// What is run on one driver.
+pub(crate) struct Part {
+    pub(crate) driver: Driver,
+    /// What the program says that it runs on.
+    pub(crate) adapter: String,
+    /// Executables, each with what filters its tests.
+    pub(crate) tests: Vec<(Tests, Vec<String>)>,
+    /// What the program is asked after that: each must exit with 0.
+    pub(crate) commands: Vec<Command>,
+}
+
+/// What has come of a part.
+#[derive(Debug, Default)]
+pub(crate) struct Count {
+    pub(crate) passed: u64,
+    pub(crate) failed: u64,
+    pub(crate) ignored: u64,
+    pub(crate) filtered: u64,
+    /// Of all its executables together.
+    pub(crate) seconds: f64,
+    /// Why it has not held.
+    pub(crate) faults: Vec<String>,
+}
+
+/// Builds the tests that `arguments` of `cargo test` choose.
+///
+/// # Errors
+/// If they do not compile.
+pub(crate) fn build(arguments: &[&str]) -> Result<Vec<Tests>, String> {
+    let shown = format!("cargo test --no-run {}", arguments.join(" "));
+    eprintln!("$ {shown}");
+    let failed = |error: std::io::Error| format!("{shown}: {error}");
+    let mut child = cargo()
+        .args([
+            "test",
+            "--no-run",
+            "--message-format=json-render-diagnostics",
+        ])
+        .args(arguments)
+        .stdout(Stdio::piped())
+        .spawn()
+        .map_err(failed)?;
+    let mut all = Vec::new();
+    let output = child.stdout.take().into_iter();
+    for line in output.flat_map(|o| BufReader::new(o).lines()) {
+        // What else a build script prints is no JSON.
+        let Ok(message) = serde_json::from_str(&line.map_err(failed)?) else {
+            continue;
+        };
+        all.extend(tests(&message));
+    }
+    match child.wait() {
+        Ok(status) if status.success() => Ok(all),
+        Ok(status) => Err(format!("{shown}: {status}")),
+        Err(error) => Err(failed(error)),
+    }
+}
+
+/// The executable of tests that cargo tells of in `message`, if it does.
+fn tests(message: &Value) -> Option<Tests> {
+    let program = message["executable"].as_str()?;
+    let manifest = PathBuf::from(message["manifest_path"].as_str()?);
+    message["profile"]["test"].as_bool()?.then_some(Tests {
+        name: message["target"]["name"].as_str()?.to_owned(),
+        program: program.into(),
+        folder: manifest.parent()?.into(),
+    })
+}
+
+/// What a worker does next.
+enum Job {
+    Tests(Tests, Vec<String>),
+    Command(Command),
+}
+
+/// Runs all parts, as many processes at a time as there are cores, and shows what each of them wrote once
+/// it has ended. Each runs its tests one by one, unless `RUST_TEST_THREADS` says otherwise: that keeps all
+/// cores busy to the end, and a device is opened once for a file. All see `variable`.
+pub(crate) fn run(parts: Vec<Part>, variable: Option<(&str, &str)>) -> Vec<Count> {
+    let counts: Vec<Mutex<Count>> = parts.iter().map(|_| Mutex::default()).collect();
+    let mut queue = VecDeque::new();
+    for (i, part) in parts.into_iter().enumerate() {
+        for (tests, filters) in part.tests {
+            queue.push_back((i, part.driver.clone(), Job::Tests(tests, filters)));
+        }
+        for command in part.commands {
+            queue.push_back((i, part.driver.clone(), Job::Command(command)));
+        }
+    }
+    let queue = Mutex::new(queue);
+    let next = || {
+        let mut queue = queue.lock().unwrap_or_else(PoisonError::into_inner);
+        queue.pop_front()
+    };
+    let work = || {
+        while let Some((i, driver, job)) = next() {
+            let done = one(&driver, job, variable);
+            let mut count = counts[i].lock().unwrap_or_else(PoisonError::into_inner);
+            count.add(done);
+        }
+    };
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    std::thread::scope(|scope| {
+        for _ in 0..cores {
+            scope.spawn(work);
+        }
+    });
+    let inner = |count: Mutex<Count>| count.into_inner().unwrap_or_else(PoisonError::into_inner);
+    counts.into_iter().map(inner).collect()
+}
+
+/// Runs a job to its end, and shows what it wrote.
+fn one(driver: &Driver, job: Job, variable: Option<(&str, &str)>) -> Count {
+    let (name, mut command, has_tests) = match job {
+        Job::Command(command) => {
+            let arguments: Vec<_> = command.get_args().map(|a| a.to_string_lossy()).collect();
+            (format!("gpu-trace {}", arguments.join(" ")), command, false)
+        }
+        Job::Tests(tests, filters) => {
+            let mut command = Command::new(&tests.program);
+            command
+                .args(filters)
+                .current_dir(&tests.folder)
+                .env("CARGO_MANIFEST_DIR", &tests.folder);
+            if std::env::var_os("RUST_TEST_THREADS").is_none() {
+                command.env("RUST_TEST_THREADS", "1");
+            }
+            (tests.name, command, true)
+        }
+    };
+    let name = format!("{name} on {}", driver.name);
+    eprintln!("started {name}");
+    let before = Instant::now();
+    command.envs(variable).stdin(Stdio::null());
+    let output = driver.choose(&mut command).output();
+    let seconds = before.elapsed().as_secs_f64();
+    let mut count = Count {
+        seconds,
+        ..Count::default()
+    };
+    match output {
+        Err(error) => count.faults.push(format!("{name}: {error}")),
+        Ok(output) => {
+            let mut shown = format!("\n--- {name}, {seconds:.1} s\n").into_bytes();
+            shown.extend(&output.stdout);
+            shown.extend(&output.stderr);
+            // A closed pipe is no fault of the tests.
+            let _ = std::io::stdout().lock().write_all(&shown);
+            let text = String::from_utf8_lossy(&output.stdout);
+            let result = text.lines().find_map(|l| l.strip_prefix("test result: "));
+            if let Some(result) = result {
+                count.passed = number(result, "passed");
+                count.failed = number(result, "failed");
+                count.ignored = number(result, "ignored");
+                count.filtered = number(result, "filtered");
+            }
+            if !output.status.success() {
+                count.faults.push(format!("{name}: {}", output.status));
+            } else if has_tests && result.is_none() {
+                count.faults.push(format!("{name}: it says no result"));
+            }
+        }
+    }
+    count
+}
+
+impl Count {
+    /// Adds what else has come of the part.
+    pub(crate) fn add(&mut self, more: Self) {
+        self.passed += more.passed;
+        self.failed += more.failed;
+        self.ignored += more.ignored;
+        self.filtered += more.filtered;
+        self.seconds += more.seconds;
+        self.faults.extend(more.faults);
+    }
+}
+
+/// The number before `word`, as in `ok. 9 passed; 0 failed`.
+fn number(result: &str, word: &str) -> u64 {
+    let words: Vec<&str> = result.split([' ', ';']).collect();
+    let number = words.windows(2).find(|pair| pair[1] == word);
+    number.and_then(|pair| pair[0].parse().ok()).unwrap_or(0)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::process::Command;
+
+    use serde_json::json;
+
+    use super::{Part, Tests, number, run, tests};
+    use crate::drivers::Driver;
+
+    #[test]
+    fn results_are_counted() {
+        let result = "FAILED. 12 passed; 3 failed; 1 ignored; 0 measured; 7 filtered out";
+        let all = ["passed", "failed", "ignored", "filtered"].map(|word| number(result, word));
+        assert_eq!(all, [12, 3, 1, 7]);
+        assert_eq!(number("something else", "passed"), 0);
+    }
+
+    #[test]
+    fn executables_of_tests_are_found() {
+        let mut message = json!({
+            "executable": "/t/faults-1", "manifest_path": "/p/Cargo.toml",
+            "profile": { "test": true }, "target": { "name": "faults" },
+        });
+        let found = tests(&message).expect("an executable");
+        assert_eq!((found.name.as_str(), found.folder), ("faults", "/p".into()));
+        message["profile"]["test"] = json!(false);
+        assert!(tests(&message).is_none(), "the program itself has no tests");
+    }
+
+    /// A part whose only executable is this one, of which it runs the test of that name.
+    fn part(name: &str) -> Part {
+        Part {
+            driver: Driver::system(),
+            adapter: String::new(),
+            tests: vec![(
+                Tests {
+                    name: "xtask".into(),
+                    program: std::env::current_exe().expect("the test's own path"),
+                    folder: ".".into(),
+                },
+                vec!["--exact".into(), name.into()],
+            )],
+            commands: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn what_fails_is_a_fault() {
+        let good = part("suite::tests::results_are_counted");
+        let missing = Part {
+            commands: vec![Command::new("/no/such/program")],
+            ..part("no test of this name")
+        };
+        let mut bad = part("suite::tests::results_are_counted");
+        bad.tests[0].1.push("--no-such-option".into());
+        let [good, missing, bad] = &run(vec![good, missing, bad], None)[..] else {
+            panic!("three parts");
+        };
+        assert_eq!((good.passed, good.failed, good.faults.len()), (1, 0, 0));
+        assert!(good.filtered > 0, "{good:?}");
+        assert_eq!((missing.passed, missing.faults.len()), (0, 1));
+        assert!(
+            missing.faults[0].contains("/no/such/program") || missing.faults[0].contains("No such")
+        );
+        assert_eq!((bad.passed, bad.faults.len()), (0, 1), "{bad:?}");
+    }
+}
