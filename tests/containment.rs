@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 
 use common::{means, render_cpu, render_gpu, scene, settings};
 use gpu_trace::check::Random;
-use gpu_trace::effects::Effects;
+use gpu_trace::effects::{Effect, Effects};
 use gpu_trace::placement::{Placement, Side};
 use gpu_trace::sampler::Sampler;
 use gpu_trace::scene::Scene;
@@ -225,7 +225,7 @@ fn a_closed_room_has_no_sky() {
         let scene = spheres(camera, &[([0.0; 3], 1.0, "lamp")]);
         let placement = Placement::new(&scene, 16, 16);
         let effects = Effects::derive(&scene, &placement, &Settings::for_scene(&scene));
-        (effects.has("environment"), placement.light)
+        (effects.has(Effect::Environment), placement.light)
     };
     assert!(!effects([0.0, 0.0, 0.5]).0);
     assert!(effects([0.0, 0.0, 4.0]).0);

@@ -11,7 +11,7 @@ use std::time::Duration;
 use common::{
     gpu_renderer, job, means, render_cpu, render_gpu, scene, scene_file, scene_files, settings,
 };
-use gpu_trace::effects::Effects;
+use gpu_trace::effects::{Effect, Effects};
 use gpu_trace::error::{Error, Result};
 use gpu_trace::film::{Film, PixelSums, Tally, Tiles, Window};
 use gpu_trace::gpu::device::STORAGE_BUFFERS;
@@ -312,7 +312,7 @@ fn few_storage_buffers_are_bound() {
                 if binds_scene { 3 } else { 2 },
                 "{file:?} with {names:?}"
             );
-            let reads_scene = effects.has("list") || effects.has("table");
+            let reads_scene = effects.has(Effect::List) || effects.has(Effect::Table);
             assert_eq!(binds_scene, reads_scene, "{file:?} with {names:?}");
             most = most.max(buffers);
         }
@@ -397,7 +397,7 @@ fn companion_a_loop_that_is_not_accounted_for_is_found() {
     // 100 spheres, eight an iteration, of which the first may have a pole frame; the ends of the loops, and
     // the loop over vertices.
     let poles = placement.poles as u32;
-    let ends = 1 + u32::from(in_list.has("pole"));
+    let ends = 1 + u32::from(in_list.has(Effect::Pole));
     let spheres = poles + (100 - poles).div_ceil(8);
     assert_eq!(vertex_steps(&placement, &in_list), spheres + ends + 1);
     assert_eq!(vertex_steps(&placement, &in_baked), 1);

@@ -7,6 +7,7 @@ use gpu_trace::check::Random;
 use gpu_trace::effects::Effects;
 use gpu_trace::gpu::device::Gpu;
 use gpu_trace::gpu::renderer::GpuRenderer;
+use gpu_trace::job::prepare;
 use gpu_trace::placement::Placement;
 use gpu_trace::scene::load::load_str;
 use gpu_trace::settings::Settings;
@@ -97,10 +98,11 @@ fn stages(gpu: &Gpu, text: &str) -> [f64; 4] {
     let placement =
         Placement::with_offset(&scene, settings.width, settings.height, settings.offset);
     lap(1);
-    let effects = Effects::derive(&scene, &placement, &settings);
+    let _ = Effects::derive(&scene, &placement, &settings);
     lap(2);
-    // A dispatch of nothing is the last that it does.
-    let renderer = GpuRenderer::new(gpu.clone(), &scene, &placement, &effects, &settings);
+    // That prepares all of this again; a dispatch of nothing is the last that it does.
+    let job = prepare(&scene, &settings).unwrap_or_else(|e| panic!("{e}"));
+    let renderer = GpuRenderer::new(gpu.clone(), &job);
     lap(3);
     drop(renderer.unwrap_or_else(|e| panic!("{e}")));
     times

@@ -196,7 +196,7 @@ fn random_scene(random: &mut Random, count: usize, glass: f64) -> Scene {
             };
             sphere.material = random.range(kinds.start as f64, kinds.end as f64) as usize;
         }
-        let kind = scene.materials[sphere.material].kind;
+        let kind = &scene.materials[sphere.material].kind;
         let chosen = kind.transmits() && random.unit() < 0.2;
         sphere.priority = chosen.then(|| random.range(-3.0, 3.0) as i32);
         if sphere.radius > 0.0 {

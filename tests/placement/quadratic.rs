@@ -3,10 +3,11 @@
 use std::collections::HashMap;
 
 use glam::DVec3;
+use gpu_trace::materials::luminance;
 use gpu_trace::placement::containment::{MOST_CORES, reachable};
 use gpu_trace::placement::media::precedes;
 use gpu_trace::placement::{Media, Medium, Side};
-use gpu_trace::scene::{Scene, Sphere, luminance};
+use gpu_trace::scene::{Scene, Sphere};
 
 use crate::Answers;
 
@@ -188,7 +189,7 @@ fn just_within(outer: &Sphere, inner: &Sphere) -> bool {
 }
 
 fn is_sealed(scene: &Scene, lamp: usize) -> bool {
-    let kind = |sphere: &Sphere| scene.materials[sphere.material].kind;
+    let kind = |sphere: &Sphere| &scene.materials[sphere.material].kind;
     let smooth = |sphere: &Sphere| kind(sphere).is_delta();
     let inner = &scene.spheres[lamp];
     scene.spheres.iter().enumerate().any(|(glass, outer)| {
