@@ -75,7 +75,7 @@ fn ours(
     let mut effects = Effects::derive(scene, &placement, &settings);
     if !with.is_empty() {
         let names: Vec<&'static str> = effects.names().chain(with.iter().copied()).collect();
-        effects = Effects::of(scene, &placement, &settings, &names);
+        effects = Effects::named(&names);
     }
     let gpu = device::open(&DeviceChoice::Best).unwrap_or_else(|e| panic!("{e}"));
     let mut renderer = GpuRenderer::new(gpu, scene, &placement, &effects, &settings)

@@ -4,13 +4,13 @@ mod common;
 
 use std::fmt::Write as _;
 
-use common::{means, render_cpu, render_gpu, scene, settings};
-use gpu_trace::check::Random;
-use gpu_trace::effects::Effects;
+use common::{render_cpu, render_gpu, scene};
+use gpu_trace::effects::{Effect, Effects};
 use gpu_trace::placement::{Placement, Side};
 use gpu_trace::sampler::Sampler;
 use gpu_trace::scene::Scene;
 use gpu_trace::settings::{GeometryChoice, Settings};
+use gpu_trace::verify::{Random, means, settings};
 
 const MATERIALS: &str = "
     [material.lamp]
@@ -225,7 +225,7 @@ fn a_closed_room_has_no_sky() {
         let scene = spheres(camera, &[([0.0; 3], 1.0, "lamp")]);
         let placement = Placement::new(&scene, 16, 16);
         let effects = Effects::derive(&scene, &placement, &Settings::for_scene(&scene));
-        (effects.has("environment"), placement.light)
+        (effects.has(Effect::Environment), placement.light)
     };
     assert!(!effects([0.0, 0.0, 0.5]).0);
     assert!(effects([0.0, 0.0, 4.0]).0);

@@ -2,12 +2,13 @@
 
 mod common;
 
-use common::{gpu, render_gpu, scene, scene_file, settings};
+use common::{gpu, render_gpu, scene, scene_file};
 use gpu_trace::backend::Backend;
 use gpu_trace::estimate::Estimate;
 use gpu_trace::ledger::{Entry, audit};
 use gpu_trace::scene::Scene;
 use gpu_trace::settings::{Integrator, Offset, Settings};
+use gpu_trace::verify::settings;
 
 fn entries(backend: &Backend, scene: &Scene, settings: &Settings) -> Vec<Entry> {
     let film = render_gpu(scene, settings);

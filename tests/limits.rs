@@ -8,13 +8,14 @@ use std::cell::RefCell;
 use std::ops::Range;
 use std::time::Duration;
 
-use common::{gpu_renderer, means, render_cpu, render_gpu, scene, settings};
+use common::{gpu_renderer, render_cpu, render_gpu, scene};
 use gpu_trace::allocation::Tiles;
 use gpu_trace::error::{Error, Result};
 use gpu_trace::film::{Film, PixelSums, Tally, Window};
 use gpu_trace::gpu::renderer::DispatchLimits;
 use gpu_trace::render::{Control, Renderer, Status, StoppedBy, Watch, render, render_quietly};
 use gpu_trace::settings::{Rect, Settings};
+use gpu_trace::verify::{means, settings};
 
 /// A closed furnace that keeps all light.
 const FURNACE: &str = "
@@ -37,7 +38,7 @@ const FURNACE: &str = "
 
 /// Many spheres in a cube under a sky.
 fn cloud(count: u32) -> String {
-    let mut random = gpu_trace::check::Random::new("cloud");
+    let mut random = gpu_trace::verify::Random::new("cloud");
     let mut text = String::from(
         "
         [camera]

@@ -11,7 +11,7 @@
 
 mod common;
 
-use common::{render_cpu, render_gpu, scene, settings};
+use common::{render_cpu, render_gpu, scene};
 use gpu_trace::estimate::{VarianceClass, variance_class};
 use gpu_trace::film::Film;
 use gpu_trace::placement::Placement;
@@ -19,6 +19,7 @@ use gpu_trace::sampler::Sampler;
 use gpu_trace::scene::Scene;
 use gpu_trace::settings::{Integrator, Settings};
 use gpu_trace::statistics::{mean_and_error, normal_limit};
+use gpu_trace::verify::settings;
 
 /// The camera inside a closed sphere that emits 1.
 fn closed(material: &str) -> Scene {
