@@ -454,8 +454,9 @@ fn unmarked(all: &[(Set, Linked)]) -> BTreeMap<&str, Set> {
     }
     with.retain(|name, effects| {
         let marked = effects.iter().any(|effect| effect.row().is_marked(name));
-        // Those of a material's module are its own, and so are its members: see layout.rs.
-        let of_material = name.starts_with("materials::") || name.starts_with("bsdf::Material::");
+        // Those of a material's module are its own; the dispatch is that of what is in use, and so are the
+        // members of `Material`: see layout.rs.
+        let of_material = name.starts_with("materials::") || name.starts_with("bsdf::");
         !effects.is_empty() && !marked && !of_material && !of_media(name) && name.contains("::")
     });
     with

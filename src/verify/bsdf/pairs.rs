@@ -21,12 +21,17 @@ fn allowance(subjects: &Subjects, input: &BsdfInput, seed: usize) -> Option<[f64
         if other.event != truth.event {
             return None;
         }
-        spread[0] = spread[0].max((other.f_cos - truth.f_cos).abs().max_element() / size);
-        spread[1] = spread[1].max((other.pdf / truth.pdf - 1.0).abs());
+        let apart = (other.f_cos - truth.f_cos).abs().max_element();
+        spread[0] = spread[0].max(relative(apart, size));
+        spread[1] = spread[1].max(relative((other.pdf - truth.pdf).abs(), truth.pdf));
     }
     let allowed = spread.map(|spread| spread + ROUNDINGS);
-    // Without light or pdf there is nothing to compare.
     allowed.iter().all(|a| *a <= EDGE).then_some(allowed)
+}
+
+/// A difference over a size; of nothing it is none.
+fn relative(apart: f64, size: f64) -> f64 {
+    if apart == 0.0 { 0.0 } else { apart / size }
 }
 
 fn f_cos(e: &Evaluated) -> DVec3 {
@@ -114,7 +119,7 @@ pub fn reciprocity(
         let (f, g) = (f_cos(a) / cos_i, factor * f_cos(b) / cos_o);
         // The cosines here are those of the f32 numbers.
         let allowed = one + other + 4.0 * ULP * (1.0 / cos_i + 1.0 / cos_o);
-        let off = (f - g).abs().max_element() / f.max_element();
+        let off = relative((f - g).abs().max_element(), f.max_element());
         agreement.add(off, allowed, || format!("{there:?}: {a:?}, {b:?}"));
     }
     Ok(agreement)
