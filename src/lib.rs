@@ -22,7 +22,8 @@
 //! 12. [`input`] and [`compare`](mod@compare): images of any origin, and how far two are apart.
 //!
 //! [`study`] measures what accuracy costs in time.
-//! [`check`] measures the hard cases of all this on a device, with the tests of [`statistics`].
+//! [`check`] measures the hard cases of all this on a device, with the tests of [`statistics`]; what it shares
+//! with `tests/` is [`verify`].
 //! [`numbers`] is how people read them. [`error`] is what can go wrong anywhere.
 
 pub mod backend;
@@ -52,3 +53,4 @@ pub mod shader;
 pub mod statistics;
 pub mod study;
 pub mod variance;
+pub mod verify;

@@ -4,9 +4,7 @@ mod common;
 
 use std::collections::BTreeSet;
 
-use common::{
-    cpu_renderer, gpu_renderer, image_bits, render_cpu, render_gpu, scene, scene_file, settings,
-};
+use common::{cpu_renderer, gpu_renderer, render_cpu, render_gpu, scene, scene_file};
 use gpu_trace::film::{
     Allocation, Estimate, Film, PILOT_SAMPLES, PixelSums, Tally, Window, next_look, window_end,
 };
@@ -15,6 +13,7 @@ use gpu_trace::render::{Control, Renderer as _, render_quietly};
 use gpu_trace::scene::Scene;
 use gpu_trace::settings::{Integrator, Rect, Settings};
 use gpu_trace::statistics::mean_and_error;
+use gpu_trace::verify::{image_bits, settings};
 
 fn adaptive(scene: &Scene, width: u32, height: u32, spp: u64) -> Settings {
     Settings {
@@ -279,7 +278,7 @@ fn nothing_is_too_dark() {
         let outcome = render_quietly(renderer, settings);
         outcome.unwrap_or_else(|e| panic!("{e}")).film
     };
-    let long = common::settings(&scene, width, height, 1 << 18);
+    let long = gpu_trace::verify::settings(&scene, width, height, 1 << 18);
     let reference = render_gpu(&scene, &long);
     let variances = (0..reference.rect().pixels())
         .map(|i| reference.variance_of_mean(i).expect("16 batches")[1]);

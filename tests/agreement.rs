@@ -9,11 +9,13 @@ mod common;
 
 use std::path::Path;
 
-use common::{image_bits, means, render_cpu, render_gpu, scene_file, scene_files, settings};
+use common::{leave, render_cpu, render_gpu, scene_file, scene_files};
 use gpu_trace::film::Film;
-use gpu_trace::scene::{MaterialKind, Scene};
+use gpu_trace::materials::MaterialKind;
+use gpu_trace::scene::Scene;
 use gpu_trace::settings::{GeometryChoice, Integrator, Settings};
 use gpu_trace::statistics::mean_and_error;
+use gpu_trace::verify::{image_bits, means, settings};
 
 /// Bound of the bias of the mean, relative.
 const EQUIVALENT: f64 = 1.0e-3;
@@ -44,7 +46,8 @@ impl Verdict {
         let size = b.iter().sum::<f64>() / b.len() as f64;
         Self {
             // Rounding has a mean of its own, which is no bias to speak of: 16 roundings of f32.
-            z: (mean.abs() - 16.0 * common::U * size).max(0.0) / error.max(f64::MIN_POSITIVE),
+            z: (mean.abs() - 16.0 * gpu_trace::verify::U * size).max(0.0)
+                / error.max(f64::MIN_POSITIVE),
             bias: (mean.abs() + INTERVAL * error) / size,
             near,
         }
@@ -76,10 +79,12 @@ fn check(jobs: impl Iterator<Item = (String, Scene, Settings)>) {
     let mut failed = Vec::new();
     for (name, scene, settings) in jobs {
         let film = render_gpu(&scene, &settings);
-        let verdict = Verdict::of(&film, &render_cpu(&scene, &settings));
+        let reference = render_cpu(&scene, &settings);
+        let verdict = Verdict::of(&film, &reference);
         eprintln!("{name}: {verdict:?}");
         if !verdict.passes() || film.tally().non_finite > 0 {
-            failed.push(format!("{name}: {verdict:?}, {:?}", film.tally()));
+            let left = leave(&name, &film, &reference);
+            failed.push(format!("{name}: {verdict:?}, {:?}; {left}", film.tally()));
         }
     }
     assert!(failed.is_empty(), "{}", failed.join("\n"));
@@ -128,10 +133,11 @@ fn perturbed(scene: &Scene, factor: f64) -> Scene {
     let mut scene = scene.clone();
     for material in &mut scene.materials {
         match &mut material.kind {
-            MaterialKind::Diffuse { albedo } => *albedo *= factor,
-            MaterialKind::Mirror { reflectance } => *reflectance *= factor,
-            MaterialKind::Dielectric { ior } => *ior = 1.0 + factor * (*ior - 1.0),
-            MaterialKind::Reflective { albedo, .. } => *albedo *= factor,
+            MaterialKind::Diffuse(m) => m.albedo *= factor,
+            MaterialKind::Mirror(m) => m.reflectance *= factor,
+            MaterialKind::Dielectric(m) => m.ior = 1.0 + factor * (m.ior - 1.0),
+            MaterialKind::Reflective(m) => m.albedo *= factor,
+            MaterialKind::Conductor(m) => m.k = m.k.map(|k| factor * k),
         }
     }
     scene

@@ -4,10 +4,11 @@ mod cli_support;
 mod common;
 
 use cli_support::{Folder, holds};
-use common::{render_cpu, render_gpu, scene, scene_file, settings};
+use common::{render_cpu, render_gpu, scene, scene_file};
 use gpu_trace::film::{Film, LightClass};
 use gpu_trace::scene::Scene;
 use gpu_trace::settings::{Integrator, Settings};
+use gpu_trace::verify::settings;
 
 const INTEGRATORS: [Integrator; 4] = [
     Integrator::Path,
@@ -65,7 +66,7 @@ fn the_classes_add_up_to_the_image() {
                     for (c, mean) in film.mean(i).into_iter().enumerate() {
                         let sum: f64 = sums.classes.iter().map(|class| class[c]).sum();
                         // Plain sums of at most 256 numbers in f32.
-                        let limit = 256.0 * common::ULP * mean;
+                        let limit = 256.0 * gpu_trace::verify::ULP * mean;
                         assert!(
                             (sum / 300.0 - mean).abs() <= limit,
                             "{file}, {}, pixel {i}: {} and {mean}",

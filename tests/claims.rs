@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{gpu_renderer, image_bits, job, scene, scene_file, settings};
+use common::{gpu_renderer, job, scene, scene_file};
 use gpu_trace::error::Result;
 use gpu_trace::film::{Film, window_end};
 use gpu_trace::gpu::renderer::{DispatchLimits, GpuRenderer};
@@ -13,6 +13,7 @@ use gpu_trace::scene::Scene;
 use gpu_trace::settings::{Integrator, LightSampling, Offset, Rect, Settings};
 use gpu_trace::statistics::{mean_and_error, normal_limit};
 use gpu_trace::variance::VarianceClass;
+use gpu_trace::verify::{image_bits, settings};
 
 /// Samples a pixel: with batches of all lengths.
 const SPP: u64 = 512;

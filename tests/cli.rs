@@ -279,7 +279,7 @@ fn quiet_and_verbose() {
         &run.stderr,
         &[
             "device: ",
-            "effects: baked, pole, sobol, diffuse, emission, bsdf, lights, projected, mis, roulette",
+            "effects: baked, pole, sobol, diffuse, emission, lights, projected, mis, roulette",
         ],
     );
     folder.write("black.toml", BLACK);
@@ -342,7 +342,7 @@ fn the_estimators_agree() {
         assert_eq!(stats["integrator"], json!(integrator), "{options}");
         assert_eq!(stats["roulette"], json!(roulette), "{options}");
         let effects = stats["effects"].as_array().expect("a list");
-        for (name, used) in [("roulette", roulette), ("bsdf", integrator != "lecture")] {
+        for (name, used) in [("roulette", roulette), ("lecture", integrator == "lecture")] {
             assert_eq!(effects.contains(&json!(name)), used, "{options}: {name}");
         }
         // The converged mean of the three channels over the whole image.

@@ -3,7 +3,9 @@
 mod cli_support;
 
 use cli_support::{BLACK, Folder, holds};
+use gpu_trace::effects::Effect;
 use gpu_trace::scene::builtin;
+use gpu_trace::shader::declared_names;
 use serde_json::{Value, json};
 
 /// All commands, and all options of `render`.
@@ -45,6 +47,7 @@ fn the_kernel_holds_what_the_scene_asks_for() {
         .validate(&module)
         .unwrap_or_else(|e| panic!("{scene}: {e:?}"));
 
+        let names = declared_names(&module);
         let mut used = Vec::new();
         for effect in table["effects"].as_array().expect("a list") {
             let name = effect["name"].as_str().expect("a name");
@@ -54,12 +57,12 @@ fn the_kernel_holds_what_the_scene_asks_for() {
                 Some(!uses),
                 "{effect}"
             );
-            // Folders of the kernel's sources are called bsdf, whatever the integrator, and "mis" is in
-            // other words.
-            let named = wgsl.to_lowercase().contains(name);
-            assert!(
-                named == uses || name == "bsdf" || name == "mis",
-                "{scene}: {name} in the kernel"
+            let row = Effect::named(name).expect("an effect").row();
+            let found = names.iter().find(|name| row.is_marked(name));
+            assert_eq!(
+                found.is_some(),
+                uses && !row.marks.is_empty(),
+                "{scene}: {name} in the kernel, {found:?}"
             );
             let row = format!("\n  {name} ");
             assert_eq!(

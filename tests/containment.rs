@@ -4,13 +4,13 @@ mod common;
 
 use std::fmt::Write as _;
 
-use common::{means, render_cpu, render_gpu, scene, settings};
-use gpu_trace::check::Random;
+use common::{render_cpu, render_gpu, scene};
 use gpu_trace::effects::{Effect, Effects};
 use gpu_trace::placement::{Placement, Side};
 use gpu_trace::sampler::Sampler;
 use gpu_trace::scene::Scene;
 use gpu_trace::settings::{GeometryChoice, Settings};
+use gpu_trace::verify::{Random, means, settings};
 
 const MATERIALS: &str = "
     [material.lamp]

@@ -6,9 +6,10 @@ mod common;
 #[expect(dead_code, reason = "the long form shows more")]
 mod study;
 
-use common::{gpu, scene_file, settings};
+use common::{gpu, scene_file};
 use gpu_trace::sampler::Sampler;
 use gpu_trace::settings::{Integrator, Settings};
+use gpu_trace::verify::settings;
 use study::{Truth, coverage, runs};
 
 const SEEDS: u64 = 60;

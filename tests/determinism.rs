@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{U, gpu_renderer, image_bits, means, render_cpu, render_gpu, scene_file, settings};
+use common::{gpu_renderer, render_cpu, render_gpu, scene_file};
 use gpu_trace::film::Film;
 use gpu_trace::gpu::renderer::DispatchLimits;
 use gpu_trace::render::render_quietly;
@@ -11,6 +11,7 @@ use gpu_trace::sampler::Sampler;
 use gpu_trace::scene::Scene;
 use gpu_trace::settings::{GeometryChoice, Rect, Settings};
 use gpu_trace::statistics::mean_and_error;
+use gpu_trace::verify::{U, image_bits, means, settings};
 
 /// A scene with all materials, a pole sphere, light and an environment.
 fn glass_ball() -> Scene {

@@ -1,258 +1,223 @@
-//! The kernel holds the effects in use, and no trace of the others: every set links, is valid, and
-//! names exactly its effects.
+//! The kernel holds the effects in use, and nothing of the others: every set links, is valid, and declares
+//! the names of its effects alone.
+//!
+//! The sets follow from the table: each effect alone, each two, as many as can be together and these without
+//! one, those of all scenes, and a random sample of the rest, all completed by what their effects need.
 
 mod common;
 
-use std::collections::BTreeSet;
-use std::fmt::Write as _;
+use std::collections::{BTreeMap, BTreeSet};
 
-use common::{scene, scene_file, scene_files};
-use gpu_trace::effects::Effects;
+use common::{scene_file, scene_files};
+use glam::DVec3;
+use gpu_trace::effects::{Effect, Effects, table};
+use gpu_trace::materials::{ALL, MaterialKind, forms};
 use gpu_trace::placement::Placement;
 use gpu_trace::placement::lights::MOST_WEIGHED;
 use gpu_trace::sampler::Sampler;
-use gpu_trace::scene::Scene;
+use gpu_trace::scene::{Camera, Handedness, Material, RenderDefaults, Scene, Sphere};
 use gpu_trace::settings::{GeometryChoice, Integrator, LightSampling, Offset, Settings};
-use gpu_trace::shader::{Stage, link};
+use gpu_trace::shader::{Kernel, Stage, declared_names, link};
+use gpu_trace::verify::Random;
 use rayon::prelude::*;
 
-type Set = BTreeSet<&'static str>;
+type Set = BTreeSet<Effect>;
 
-/// All effects, in the table's order.
-const ALL: [&str; 27] = [
-    "baked",
-    "list",
-    "pole",
-    "interior",
-    "straddle",
-    "nested",
-    "nudge",
-    "ulp",
-    "lens",
-    "sobol",
-    "classes",
-    "features",
-    "adaptive",
-    "diffuse",
-    "mirror",
-    "dielectric",
-    "priority",
-    "reflective",
-    "emission",
-    "environment",
-    "lecture",
-    "bsdf",
-    "lights",
-    "projected",
-    "table",
-    "mis",
-    "roulette",
-];
+/// Sets drawn at random.
+const SAMPLED: usize = 1000;
 
-/// Of these, only one can be in use.
-const EXCLUSIVE: [[&str; 2]; 10] = [
-    ["baked", "list"],
-    ["lecture", "bsdf"],
-    ["lecture", "roulette"],
-    ["lecture", "lights"],
-    ["lecture", "projected"],
-    ["lecture", "table"],
-    ["lecture", "mis"],
-    ["nudge", "ulp"],
-    ["nested", "nudge"],
-    ["nested", "ulp"],
-];
-
-const MATERIALS: [&str; 4] = ["diffuse", "mirror", "dielectric", "reflective"];
-
-/// Effects that must leave no trace in the WGSL where they are not in use, in any case, not even as
-/// a part of a name.
-const WORDS: [&str; 22] = [
-    "diffuse",
-    "mirror",
-    "dielectric",
-    "priority",
-    "reflective",
-    "lens",
-    "sobol",
-    "classes",
-    "features",
-    "adaptive",
-    "environment",
-    "emission",
-    "roulette",
-    "pole",
-    "interior",
-    "lecture",
-    "lights",
-    "projected",
-    "table",
-    "nested",
-    "nudge",
-    "ulp",
-];
-
-fn possible(set: &Set) -> bool {
-    let nudged = set.contains("nudge") || set.contains("ulp");
-    // A lamp that the lens straddles is not sampled, and here all lamps are of one material.
-    if set.contains("lights") && set.contains("straddle") && !nudged {
-        return false;
-    }
-    // What is inside without glass, lens or nudge is a room around the camera, which has no sky.
-    let room = set.contains("interior") && !set.contains("dielectric") && !set.contains("straddle");
-    if room && set.contains("environment") {
-        return false;
-    }
-    EXCLUSIVE
-        .iter()
-        .all(|pair| !pair.iter().all(|name| set.contains(name)))
+fn every() -> impl DoubleEndedIterator<Item = Effect> + Clone {
+    table().iter().map(|row| row.effect)
 }
 
-/// `names` and the least that they need to be a kernel.
-fn completed(names: impl IntoIterator<Item = &'static str>) -> Set {
-    let mut set: Set = names.into_iter().collect();
-    if !set.contains("list") {
-        set.insert("baked");
-    }
-    if !set.contains("lecture") {
-        set.insert("bsdf");
-    }
-    if ["mis", "projected", "table"]
+fn excluded(a: Effect, b: Effect) -> bool {
+    a.row().excludes.contains(&b) || b.row().excludes.contains(&a)
+}
+
+fn possible(set: &Set) -> bool {
+    set.iter().all(|a| set.iter().all(|b| !excluded(*a, *b)))
+}
+
+/// `set` with what its effects need: of each list the first that nothing excludes. `None` if there is none.
+fn completed(set: impl IntoIterator<Item = Effect>) -> Option<Set> {
+    let mut set: Set = set.into_iter().collect();
+    let opaque = Effect::Form(0);
+    if [Effect::Nested, Effect::Straddle]
         .iter()
-        .any(|n| set.contains(n))
+        .any(|e| set.contains(e))
     {
-        set.insert("lights");
+        // What scenes here have within glass, and through a lens.
+        set.insert(opaque);
     }
-    if set.contains("lights") {
-        set.insert("emission");
-        if !set.contains("projected") {
-            set.insert("table");
+    if !set.contains(&Effect::List) {
+        set.insert(Effect::Baked);
+    }
+    loop {
+        if !possible(&set) {
+            return None;
         }
+        let lists = set.iter().flat_map(|effect| &effect.row().needs);
+        let Some(missing) = lists
+            .into_iter()
+            .find(|list| !list.iter().any(|effect| set.contains(effect)))
+        else {
+            return Some(set);
+        };
+        let fits = |effect: &&Effect| set.iter().all(|other| !excluded(**effect, *other));
+        let added = *missing.iter().find(fits)?;
+        set.insert(added);
     }
-    let nudged = set.contains("nudge") || set.contains("ulp");
-    if nudged {
-        set.insert("straddle");
-    } else if set.contains("straddle") {
-        set.extend(["lens", "diffuse"]);
+}
+
+/// `set` without an effect and all that need it.
+fn without(set: &Set, effect: Effect) -> Option<Set> {
+    let mut rest = set.clone();
+    rest.remove(&effect);
+    loop {
+        let unmet = rest.iter().copied().find(|effect| {
+            let lists = &effect.row().needs;
+            !lists
+                .iter()
+                .all(|list| list.iter().any(|e| rest.contains(e)))
+        });
+        match unmet {
+            Some(unmet) => rest.remove(&unmet),
+            None => return completed(rest),
+        };
     }
-    if set.contains("straddle") {
-        set.insert("interior");
-    }
-    if set.contains("nested") {
-        // A ball of another material in glass.
-        set.extend(["dielectric", "diffuse"]);
-    }
-    if set.contains("priority") {
-        set.insert("dielectric");
-    }
-    if set.contains("dielectric") {
-        set.insert("interior");
-    }
-    let surface = ["pole", "interior", "emission"]
-        .iter()
-        .any(|name| set.contains(name));
-    if surface && !MATERIALS.iter().any(|m| set.contains(m)) {
-        set.insert("diffuse");
+}
+
+/// As many effects as can be in use together, tried in this order.
+fn filled(start: Set, order: impl Iterator<Item = Effect>) -> Set {
+    let mut set = start;
+    for effect in order {
+        let more = set.iter().copied().chain([effect]);
+        if let Some(larger) = completed(more).filter(|larger| larger.is_superset(&set)) {
+            set = larger;
+        }
     }
     set
 }
 
-/// A scene and settings that ask for exactly the effects of `set`.
+/// A few largest sets; every effect is in one.
+fn largest() -> BTreeSet<Set> {
+    let starts: Vec<Set> = every().filter_map(|effect| completed([effect])).collect();
+    let one_way = starts.iter().map(|start| filled(start.clone(), every()));
+    let other_way = starts
+        .iter()
+        .map(|start| filled(start.clone(), every().rev()));
+    one_way.chain(other_way).collect()
+}
+
+/// The first case of a material that has this form.
+fn of_form(code: u32) -> MaterialKind {
+    let cases = ALL.iter().flat_map(|material| (material.cases)());
+    let mut fitting = cases.filter(|kind| kind.form() == forms()[code as usize]);
+    fitting.next().expect("a case of every form")
+}
+
+/// A scene and settings that ask for exactly the effects of `set`, where that is possible.
 fn asking_for(set: &Set) -> (Scene, Settings) {
-    let has = |name: &str| set.contains(name);
-    let mut text =
-        String::from("[camera]\nposition = [0, 0, 6]\nlook_at = [0, 0, 0]\nfov = 40.0\n");
-    if has("lens") {
-        text += "aperture_radius = 0.1\nfocus_distance = 6.0\n";
-    }
-    text += "[image]\nwidth = 16\nheight = 16\n";
-    if has("environment") {
-        text += "[environment]\nradiance = [0.5, 0.6, 0.7]\n";
-    }
-    let materials: Vec<&str> = MATERIALS.into_iter().filter(|m| has(m)).collect();
-    for (i, material) in materials.iter().enumerate() {
-        let members = match *material {
-            "diffuse" => "albedo = [0.5, 0.6, 0.7]",
-            "mirror" => "reflectance = [0.9, 0.8, 0.7]",
-            "dielectric" => "ior = 1.5",
-            _ => "albedo = [0.1, 0.2, 0.3]\nspecular = [0.5, 0.5, 0.5]\nepsilon = 0.01\nmu = 10.0",
-        };
-        let _ = writeln!(text, "[material.m{i}]\ntype = \"{material}\"\n{members}");
-        if has("emission") && i == 0 {
-            text += "emission = [1.0, 2.0, 3.0]\n";
-        }
-    }
-    let mut sphere = |material: usize, x: f64, y: f64, radius: f64| {
-        let _ = writeln!(
-            text,
-            "[[sphere]]\ncenter = [{x:?}, {y:?}, 0.0]\nradius = {radius:?}\nmaterial = \"m{material}\""
-        );
+    let has = |effect| set.contains(&effect);
+    let kinds: Vec<MaterialKind> = set
+        .iter()
+        .filter_map(|effect| match effect {
+            Effect::Form(code) => Some(of_form(*code)),
+            _ => None,
+        })
+        .collect();
+    let material = |(i, kind): (usize, &MaterialKind)| Material {
+        name: format!("m{i}"),
+        kind: kind.clone(),
+        emission: DVec3::splat(if has(Effect::Emission) && i == 0 {
+            2.0
+        } else {
+            0.0
+        }),
     };
-    for i in 0..materials.len() {
-        // Off the view axis: what the view starts at has a pole frame.
-        sphere(i, 2.0 * i as f64, 1.5, 0.5);
+    let glass = kinds.iter().position(|kind| kind.transmits());
+    let mut spheres = Vec::new();
+    let mut sphere = |material: usize, x: f64, y: f64, z: f64, radius: f64| {
+        spheres.push(Sphere {
+            center: DVec3::new(x, y, z),
+            radius,
+            material,
+            priority: None,
+        });
+    };
+    // Off the view axis: what the view starts at has a pole frame.
+    for i in 0..kinds.len() {
+        sphere(i, 2.0 * i as f64, 1.5, 0.0, 0.5);
     }
-    if has("priority")
-        && let Some(i) = materials.iter().position(|m| *m == "dielectric")
-    {
-        sphere(i, 2.0 * i as f64, 1.75, 0.5);
-    }
-    if has("nested")
-        && let Some(i) = materials.iter().position(|m| *m == "dielectric")
-    {
-        sphere(0, 2.0 * i as f64, 1.5, 0.49999);
-    }
-    if has("projected") && has("table") {
-        for i in 0..=MOST_WEIGHED {
-            sphere(0, 0.4 * i as f64 - 1.6, 4.0, 0.1);
+    if let Some(i) = glass {
+        if has(Effect::Priority) {
+            sphere(i, 2.0 * i as f64, 1.75, 0.0, 0.5);
+        }
+        if has(Effect::Nested) {
+            sphere(0, 2.0 * i as f64, 1.5, 0.0, 0.49999);
         }
     }
-    let nudged = has("nudge") || has("ulp");
-    if has("straddle") && !nudged {
+    if has(Effect::Projected) && has(Effect::Table) {
+        for i in 0..=MOST_WEIGHED {
+            sphere(0, 0.4 * i as f64 - 1.6, 4.0, 0.0, 0.1);
+        }
+    }
+    let nudged = has(Effect::Nudge) || has(Effect::Ulp);
+    if has(Effect::Straddle) && !nudged {
         // Through the lens, with something so small and far that this one gets no pole frame.
-        sphere(0, 0.0, 0.0, 6.0);
-        sphere(0, 900.0, 900.0, 0.01);
+        sphere(0, 0.0, 0.0, 0.0, 6.0);
+        sphere(0, 900.0, 900.0, 0.0, 0.01);
     }
-    if has("pole") {
-        sphere(0, 0.0, -10001.0, 10000.0);
+    if has(Effect::Pole) {
+        sphere(0, 0.0, -10001.0, 0.0, 10000.0);
     }
-    if has("interior") && !has("dielectric") && !has("straddle") {
+    if has(Effect::Interior) && glass.is_none() && !has(Effect::Straddle) {
         // Around the camera, and too far away for a pole frame.
-        sphere(0, 0.0, 0.0, 100.0);
+        sphere(0, 0.0, 0.0, 0.0, 100.0);
     }
-    let scene = scene(&text);
+    let scene = Scene {
+        camera: Camera {
+            position: DVec3::new(0.0, 0.0, 6.0),
+            look_at: DVec3::ZERO,
+            up: DVec3::Y,
+            fov: 40.0,
+            handedness: Handedness::Right,
+            aperture_radius: if has(Effect::Lens) { 0.1 } else { 0.0 },
+            focus_distance: 6.0,
+        },
+        width: 16,
+        height: 16,
+        render: RenderDefaults::default(),
+        environment: has(Effect::Environment).then_some(DVec3::new(0.5, 0.6, 0.7)),
+        materials: kinds.iter().enumerate().map(material).collect(),
+        spheres,
+    };
     let settings = Settings {
-        geometry: if has("list") {
-            GeometryChoice::List
-        } else {
-            GeometryChoice::Baked
+        geometry: match has(Effect::List) {
+            true => GeometryChoice::List,
+            false => GeometryChoice::Baked,
         },
-        integrator: if has("lecture") {
-            Integrator::Lecture { termination: 0.2 }
-        } else if has("mis") {
-            Integrator::Path
-        } else if has("lights") {
-            Integrator::Nee
-        } else {
-            Integrator::Bsdf
+        integrator: match [Effect::Lecture, Effect::Mis, Effect::Lights].map(has) {
+            [true, ..] => Integrator::Lecture { termination: 0.2 },
+            [_, true, _] => Integrator::Path,
+            [.., true] => Integrator::Nee,
+            _ => Integrator::Bsdf,
         },
-        light_sampling: if has("lights") && !has("projected") {
-            LightSampling::Cone
-        } else {
-            LightSampling::Projected
+        light_sampling: match has(Effect::Lights) && !has(Effect::Projected) {
+            true => LightSampling::Cone,
+            false => LightSampling::Projected,
         },
-        roulette: has("roulette"),
-        adaptive: has("adaptive"),
-        classes: has("classes"),
-        features: has("features"),
-        sampler: if has("sobol") {
-            Sampler::Sobol
-        } else {
-            Sampler::Independent
+        roulette: has(Effect::Roulette),
+        adaptive: has(Effect::Adaptive),
+        classes: has(Effect::Classes),
+        features: has(Effect::Features),
+        sampler: match has(Effect::Sobol) {
+            true => Sampler::Sobol,
+            false => Sampler::Independent,
         },
-        offset: match (has("nudge"), has("ulp")) {
-            (true, _) => Offset::Out(1.0e-4),
-            (_, true) => Offset::Ulp,
+        offset: match [Effect::Nudge, Effect::Ulp].map(has) {
+            [true, _] => Offset::Out(1.0e-4),
+            [_, true] => Offset::Ulp,
             _ => Offset::Exact,
         },
         ..Settings::for_scene(&scene)
@@ -260,191 +225,188 @@ fn asking_for(set: &Set) -> (Scene, Settings) {
     (scene, settings)
 }
 
-fn placed(scene: &Scene, settings: &Settings) -> Placement {
-    Placement::with_offset(scene, settings.width, settings.height, settings.offset)
+/// A set's kernel, the names in it, and what is wrong with it, if anything is.
+struct Linked {
+    asked_for: bool,
+    names: BTreeSet<String>,
+    fault: Option<String>,
 }
 
-/// Links both stages for a set; what is wrong, if anything is.
-fn fault(set: &Set) -> Option<String> {
+/// Links both stages for a set. Its scene asks for it, or, where no scene does, for nearly it.
+fn linked(set: &Set) -> Linked {
     let (scene, settings) = asking_for(set);
-    let placement = placed(&scene, &settings);
-    let effects = Effects::derive(&scene, &placement, &settings);
-    let derived: Set = effects.names().collect();
-    if derived != *set {
-        return Some(format!("{set:?}: the scene asks for {derived:?}"));
+    let placement =
+        Placement::with_offset(&scene, settings.width, settings.height, settings.offset);
+    let derived: Set = Effects::derive(&scene, &placement, &settings)
+        .used()
+        .collect();
+    let effects = Effects::of(&set.iter().copied().collect::<Vec<_>>());
+    let (names, fault) = judged(&scene, &placement, &effects, true);
+    Linked {
+        asked_for: derived == *set,
+        names,
+        fault,
     }
-    // The probe has neither geometry nor loop: once for each set of the rest.
-    let probe = !["list", "roulette"].iter().any(|name| set.contains(name));
-    fault_of(&scene, &placement, &effects, probe)
 }
 
-fn fault_of(
+fn judged(
     scene: &Scene,
     placement: &Placement,
     effects: &Effects,
     probe: bool,
-) -> Option<String> {
-    let names: Vec<&str> = effects.names().collect();
+) -> (BTreeSet<String>, Option<String>) {
+    let set: Vec<&str> = effects.names().collect();
+    let fault = |what: String| Some(format!("{set:?}: {what}"));
     if probe && let Err(e) = link(Stage::Probe, scene, placement, effects) {
-        return Some(format!("{names:?}: the probe: {e}"));
+        return (BTreeSet::new(), fault(format!("the probe: {e}")));
     }
     match link(Stage::Path, scene, placement, effects) {
-        Err(e) => Some(format!("{names:?}: {e}")),
-        Ok(kernel) => wrong_words(&kernel.wgsl, effects).map(|w| format!("{names:?}: {w}")),
+        Err(e) => (BTreeSet::new(), fault(e.to_string())),
+        Ok(kernel) => {
+            let names = declared_names(&kernel.module);
+            let wrong = wrong_names(&names, effects).and_then(fault);
+            (names, wrong)
+        }
     }
 }
 
-/// A word that is there and should not be, or the other way round.
-fn wrong_words(wgsl: &str, effects: &Effects) -> Option<String> {
-    let wgsl = wgsl.to_lowercase();
-    for word in WORDS {
-        let lines: Vec<&str> = wgsl.lines().filter(|line| line.contains(word)).collect();
-        match (effects.has(word), lines.first()) {
-            (false, Some(line)) => return Some(format!("{word} occurs: {line}")),
-            (true, None) => return Some(format!("{word} does not occur")),
+/// Whether a name belongs to what all materials that transmit bring together.
+fn of_media(name: &str) -> bool {
+    let own = [
+        "level_of",
+        "runs_within",
+        "TRACKED",
+        "eta_scale",
+        "INITIAL_WITHIN",
+    ];
+    let mut parts = name.split("::");
+    parts.any(|part| part == "media" || own.contains(&part))
+}
+
+/// A name that is there and should not be, or the other way round.
+fn wrong_names(names: &BTreeSet<String>, effects: &Effects) -> Option<String> {
+    let used: Set = effects.used().collect();
+    for row in table() {
+        let found = names.iter().find(|name| row.is_marked(name));
+        match (used.contains(&row.effect), found) {
+            (false, Some(name)) => return Some(format!("{} left {name}", row.name)),
+            (true, None) if !row.marks.is_empty() => {
+                return Some(format!("nothing of {} is there", row.name));
+            }
             _ => {}
         }
     }
-    None
+    let media = names.iter().find(|name| of_media(name));
+    if media.is_some() != effects.transmits() {
+        return Some(format!("transmits: {media:?}"));
+    }
+    for material in ALL {
+        let module = format!("materials::{}::", material.module);
+        let in_use = effects
+            .forms()
+            .any(|(_, form)| material.forms.contains(form));
+        let found = names.iter().find(|name| name.starts_with(&module));
+        if found.is_some() != in_use {
+            return Some(format!("{}, used {in_use}: {found:?}", material.name));
+        }
+    }
+    // What plays a role is in the kernel by the role's name only.
+    let files = effects.roles().into_iter().filter_map(|role| role.file);
+    files
+        .map(|file| format!("{}::", file.replace('/', "::")))
+        .find_map(|path| names.iter().find(|name| name.starts_with(&path)).cloned())
 }
 
-fn check(sets: &BTreeSet<Set>) {
-    let all: Vec<&Set> = sets.iter().collect();
-    let faults: Vec<String> = all.par_iter().filter_map(|set| fault(set)).collect();
-    let shown = faults
-        .iter()
-        .take(8)
-        .cloned()
-        .collect::<Vec<_>>()
-        .join("\n");
-    assert!(
-        faults.is_empty(),
-        "{} of {} sets:\n{shown}",
-        faults.len(),
-        sets.len()
-    );
+/// Links all sets; none may be faulty.
+fn check(sets: &BTreeSet<Set>) -> Vec<(Set, Linked)> {
+    let all: Vec<(Set, Linked)> = sets
+        .par_iter()
+        .map(|set| (set.clone(), linked(set)))
+        .collect();
+    let faults: Vec<&str> = all.iter().filter_map(|(_, l)| l.fault.as_deref()).collect();
+    let shown = faults[..faults.len().min(8)].join("\n");
+    let (bad, total) = (faults.len(), all.len());
+    let asked_for = all.iter().filter(|(_, linked)| linked.asked_for).count();
+    eprintln!("{total} sets, {asked_for} of them as their scene asks for");
+    assert!(bad == 0, "{bad} of {total} sets:\n{shown}");
+    all
+}
+
+fn singles() -> BTreeSet<Set> {
+    let alone = every().filter_map(|effect| completed([effect]));
+    let list = every().filter_map(|effect| completed([effect, Effect::List]));
+    alone.chain(list).collect()
+}
+
+fn pairs() -> BTreeSet<Set> {
+    every()
+        .flat_map(|a| every().map(move |b| [a, b]))
+        .filter(|[a, b]| a < b)
+        .filter_map(completed)
+        .collect()
 }
 
 #[test]
-fn the_table_is_the_one_tested() {
-    let (scene, settings) = asking_for(&completed([]));
-    let placement = Placement::new(&scene, settings.width, settings.height);
-    let effects = Effects::derive(&scene, &placement, &settings);
-    let names: Vec<&str> = effects.table().iter().map(|e| e.name).collect();
-    assert_eq!(names, ALL);
+fn the_table_can_be_fulfilled() {
+    // No effect excludes what it needs; the codes and names are each other's.
+    for row in table() {
+        assert!(completed([row.effect]).is_some(), "{}", row.name);
+        assert_eq!(Effect::named(row.name), Some(row.effect));
+        let rows = table().iter().filter(|other| other.name == row.name);
+        assert_eq!(rows.count(), 1, "{}", row.name);
+    }
+    let all: Set = largest().into_iter().flatten().collect();
+    assert_eq!(all, every().collect());
 }
 
 #[test]
 fn each_effect_alone() {
-    let mut sets: BTreeSet<Set> = ALL.iter().map(|name| completed([*name])).collect();
-    sets.extend(
-        ALL.iter()
-            .map(|name| completed([*name, "list"]))
-            .filter(possible),
-    );
-    check(&sets);
+    for (set, linked) in check(&singles()) {
+        let (scene, settings) = asking_for(&set);
+        let placement =
+            Placement::with_offset(&scene, settings.width, settings.height, settings.offset);
+        let derived = Effects::derive(&scene, &placement, &settings);
+        let names: Vec<&str> = derived.names().collect();
+        assert!(linked.asked_for, "{set:?}: the scene asks for {names:?}");
+    }
 }
 
 #[test]
 fn all_pairs() {
-    let mut sets = BTreeSet::new();
-    let mut impossible = 0;
-    for (i, a) in ALL.iter().enumerate() {
-        for b in &ALL[i + 1..] {
-            let set = completed([*a, *b]);
-            if possible(&set) {
-                sets.insert(set);
-            } else {
-                impossible += 1;
-            }
-        }
-    }
-    // And a straddled lamp with any of the four effects of light sampling, and a room with a sky.
-    assert_eq!(impossible, EXCLUSIVE.len() + 5);
-    check(&sets);
-}
-
-/// All effects that can be in use together, for both geometries, both integrators, and every way
-/// to leave a surface.
-fn largest() -> Vec<Set> {
-    let mut sets = Vec::new();
-    for form in ["baked", "list"] {
-        for lecture in [false, true] {
-            for exit in ["nested", "nudge", "ulp"] {
-                let other = |name: &&str| match *name {
-                    "baked" | "list" => *name == form,
-                    "lecture" => lecture,
-                    "bsdf" | "roulette" | "mis" => !lecture,
-                    // See `possible`.
-                    "lights" | "projected" | "table" => !lecture,
-                    "straddle" => lecture || exit != "nested",
-                    "nested" | "nudge" | "ulp" => *name == exit,
-                    _ => true,
-                };
-                sets.push(ALL.into_iter().filter(other).collect());
-            }
-        }
-    }
-    sets
+    let sets = pairs();
+    let all = check(&sets);
+    // Few pairs have no scene that asks for them: a lamp that the lens straddles, a room with a sky.
+    let asked_for = all.iter().filter(|(_, linked)| linked.asked_for).count();
+    assert!(
+        10 * asked_for >= 9 * all.len(),
+        "{asked_for} of {}",
+        all.len()
+    );
 }
 
 #[test]
 fn all_and_all_but_one() {
-    let mut sets = BTreeSet::new();
-    for all in largest() {
-        for left_out in &all {
-            let rest = completed(all.iter().copied().filter(|name| name != left_out));
-            // What needs it goes with it.
-            let needed = rest.contains(left_out);
-            let rest = if needed && *left_out == "interior" {
-                let inside = [
-                    "interior",
-                    "dielectric",
-                    "straddle",
-                    "nested",
-                    "nudge",
-                    "ulp",
-                ];
-                completed(all.iter().copied().filter(|n| !inside.contains(n)))
-            } else {
-                rest
-            };
-            // Without the nudge, a lamp that the lens straddles is left: see `possible`.
-            if possible(&rest) {
-                sets.insert(rest);
-            }
-        }
-        sets.insert(all);
+    let mut sets = largest();
+    for all in &sets.clone() {
+        sets.extend(all.iter().filter_map(|effect| without(all, *effect)));
     }
     check(&sets);
 }
 
 #[test]
-fn every_possible_set() {
-    let subset = |names: &[&'static str], bits: u32| {
-        let chosen = names.iter().enumerate().filter(|(i, _)| bits >> i & 1 == 1);
-        completed(chosen.map(|(_, n)| *n))
-    };
-    // Of sets with the rare ones, there are too many to link them all in a minute.
-    let rare = [
-        "straddle",
-        "nested",
-        "nudge",
-        "ulp",
-        "lights",
-        "projected",
-        "table",
-        "mis",
-        "sobol",
-        "adaptive",
-        "classes",
-        "features",
-    ];
-    let common: Vec<&'static str> = ALL.into_iter().filter(|n| !rare.contains(n)).collect();
-    let every = (0..1 << common.len()).map(|bits| subset(&common, bits));
-    let some = (0..4000u32).map(|i| subset(&ALL, i.wrapping_mul(0x9e37_79b9) >> (32 - ALL.len())));
-    let sets: BTreeSet<Set> = every.chain(some).filter(possible).collect();
-    eprintln!("{} sets", sets.len());
+fn a_sample_of_the_rest() {
+    let mut random = Random::new("sets of effects");
+    let mut sets = BTreeSet::new();
+    while sets.len() < SAMPLED {
+        // From sparse to dense, in any order.
+        let share = random.range(0.1, 0.9);
+        let mut order: Vec<(f64, Effect)> = every().map(|e| (random.unit(), e)).collect();
+        order.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let chosen = order.into_iter().map(|(_, effect)| effect);
+        let chosen: Vec<Effect> = chosen.filter(|_| random.unit() < share).collect();
+        let start = completed([]).expect("nothing excludes nothing");
+        sets.insert(filled(start, chosen.into_iter()));
+    }
     check(&sets);
 }
 
@@ -453,14 +415,7 @@ fn every_set_in_the_scenes() {
     // As they are, and with the other geometry and integrator.
     let jobs: Vec<_> = scene_files()
         .into_iter()
-        .flat_map(|path| {
-            [
-                (path.clone(), 0),
-                (path.clone(), 1),
-                (path.clone(), 2),
-                (path, 3),
-            ]
-        })
+        .flat_map(|path| (0..4).map(move |variant| (path.clone(), variant)))
         .collect();
     let faults: Vec<String> = jobs
         .par_iter()
@@ -475,43 +430,69 @@ fn every_set_in_the_scenes() {
             }
             let placement = Placement::new(&scene, settings.width, settings.height);
             let effects = Effects::derive(&scene, &placement, &settings);
-            fault_of(&scene, &placement, &effects, false)
-                .map(|f| format!("{}: {f}", path.display()))
+            let set: Set = effects.used().collect();
+            if completed(set.iter().copied()) != Some(set) {
+                return Some(format!("{}: not as the table says", path.display()));
+            }
+            let (_, fault) = judged(&scene, &placement, &effects, false);
+            fault.map(|fault| format!("{}: {fault}", path.display()))
         })
         .collect();
     assert!(faults.is_empty(), "{}", faults.join("\n"));
 }
 
+/// Names in modules, and members, that came with the same effects every time and that none of these has for
+/// its own. What functions declare within them goes with them.
+fn unmarked(all: &[(Set, Linked)]) -> BTreeMap<&str, Set> {
+    let mut with: BTreeMap<&str, Set> = BTreeMap::new();
+    for (set, linked) in all {
+        for name in &linked.names {
+            with.entry(name)
+                .and_modify(|common| common.retain(|effect| set.contains(effect)))
+                .or_insert_with(|| set.clone());
+        }
+    }
+    with.retain(|name, effects| {
+        let marked = effects.iter().any(|effect| effect.row().is_marked(name));
+        // Those of a material's module are its own; the dispatch is that of what is in use, and so are the
+        // members of `Material`: see layout.rs.
+        let of_material = name.starts_with("materials::") || name.starts_with("bsdf::");
+        !effects.is_empty() && !marked && !of_material && !of_media(name) && name.contains("::")
+    });
+    with
+}
+
 #[test]
-fn companion_the_search_finds() {
-    // A kernel with everything against a table with nothing, and the other way round: every word
-    // is found, and its absence is.
-    let [full, ..] = &largest()[..] else {
-        panic!("no largest set")
-    };
-    let (scene, settings) = asking_for(full);
-    let placement = Placement::new(&scene, settings.width, settings.height);
-    let kernel = |names: &[&str]| {
-        let effects = Effects::of(&scene, &placement, &settings, names);
-        link(Stage::Path, &scene, &placement, &effects).map(|k| k.wgsl)
-    };
-    let names: Vec<&str> = full.iter().copied().collect();
-    let wgsl = kernel(&names).unwrap_or_else(|e| panic!("{e}"));
-    for word in names.iter().filter(|n| WORDS.contains(n)) {
-        let without: Vec<&str> = names.iter().copied().filter(|n| n != word).collect();
-        let effects = Effects::of(&scene, &placement, &settings, &without);
-        let found = wrong_words(&wgsl, &effects);
-        assert!(
-            found.as_ref().is_some_and(|f| f.contains("occurs")),
-            "{word}: {found:?}"
-        );
-        let alone = Effects::of(&scene, &placement, &settings, &[word]);
-        let missing = wrong_words("fn main() {}", &alone);
-        assert!(
-            missing
-                .as_ref()
-                .is_some_and(|f| f.contains("does not occur")),
-            "{missing:?}"
-        );
+fn what_comes_with_an_effect_is_its_own() {
+    let mut sets = singles();
+    for all in &largest() {
+        sets.insert(all.clone());
+        sets.extend(all.iter().filter_map(|effect| without(all, *effect)));
+    }
+    let all = check(&sets);
+    let declared = unmarked(&all);
+    assert!(declared.is_empty(), "{declared:#?}");
+}
+
+#[test]
+fn companion_traces_are_found() {
+    // A kernel with everything against a table with less, and the other way round.
+    for set in largest() {
+        let kernel = |set: &Set| -> Kernel {
+            let (scene, settings) = asking_for(set);
+            let placement = Placement::new(&scene, settings.width, settings.height);
+            let effects = Effects::of(&set.iter().copied().collect::<Vec<_>>());
+            link(Stage::Path, &scene, &placement, &effects).unwrap_or_else(|e| panic!("{e}"))
+        };
+        let names = declared_names(&kernel(&set).module);
+        for effect in &set {
+            let rest: Vec<Effect> = set.iter().copied().filter(|e| e != effect).collect();
+            let found = wrong_names(&names, &Effects::of(&rest));
+            let marked = !effect.row().marks.is_empty();
+            assert_eq!(found.is_some(), marked, "{effect:?}: {found:?}");
+            let alone = Effects::of(&[*effect]);
+            let missing = wrong_names(&BTreeSet::new(), &alone);
+            assert_eq!(missing.is_some(), marked, "{effect:?}: {missing:?}");
+        }
     }
 }

@@ -15,7 +15,6 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use cli_support::{Background, Folder, Run, bits, holds};
-use gpu_trace::check::Random;
 use gpu_trace::error::Error;
 use gpu_trace::gpu::renderer::GpuRenderer;
 use gpu_trace::image::{Format, Picture};
@@ -23,6 +22,7 @@ use gpu_trace::input::{self, decode};
 use gpu_trace::output::{Contents, Metadata, atomic, npy};
 use gpu_trace::scene::load::{load_file, load_str};
 use gpu_trace::settings::GeometryChoice;
+use gpu_trace::verify::Random;
 use serde_json::json;
 
 /// On one thread, the first paths of this furnace take longer than any test; and it is small, so that they
@@ -156,7 +156,7 @@ fn faults_are_for_those_who_know_them() {
 #[test]
 fn a_scene_beyond_the_devices_limits_is_an_error() {
     let scene = common::scene_file("scenes/glass.toml");
-    let mut settings = common::settings(&scene, 64, 64, 1);
+    let mut settings = gpu_trace::verify::settings(&scene, 64, 64, 1);
     settings.geometry = GeometryChoice::List;
     let job = common::job(&scene, &settings);
     let with_at_most = |bytes: u64| {

@@ -1,16 +1,16 @@
 //! The functions of `core/` and the ray-sphere solver on the device against its f64 twin, fed with the same
-//! f32 numbers. Tolerances count roundings, in ULP = 2^-23 (see `common::ULP`). The companions feed
+//! f32 numbers. Tolerances count roundings, in ULP = 2^-23 (see `gpu_trace::verify::ULP`). The companions feed
 //! the twin with slightly wrong numbers: at least half of the cases must then be off.
 
 mod common;
 
-use common::{Agreement, Row, ULP, probe, to_row, vector};
+use common::probe;
 use glam::{DVec2, DVec3};
-use gpu_trace::check::Random;
 use gpu_trace::reference::core::sampling::{
     basis_around, cap_direction, circle_point, cosine_direction, sphere_direction,
 };
 use gpu_trace::reference::scene::sphere::{Quadratic, root_outside, sphere_quadratic};
+use gpu_trace::verify::{Agreement, Random, Row, ULP, to_row, vector};
 
 const CASES: usize = 100_000;
 const NO_HIT: f32 = 3.0e38;

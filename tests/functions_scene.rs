@@ -3,14 +3,14 @@
 
 mod common;
 
-use common::{Agreement, EMPTY, Row, ULP, probe, probe_of, scene, to_row, vector};
+use common::{probe, probe_of, scene};
 use glam::DVec3;
-use gpu_trace::check::Random;
 use gpu_trace::placement::{Medium, PlacedSphere, Placement, Side};
 use gpu_trace::reference::scene::camera::camera_ray;
 use gpu_trace::reference::scene::priority::{cross_surface, relative_index};
 use gpu_trace::reference::scene::ray::{Hit, Ray, vertex_at};
 use gpu_trace::reference::scene::sphere::{Quadratic, pole_quadratic, root_interior, root_outside};
+use gpu_trace::verify::{Agreement, EMPTY, Random, Row, ULP, to_row, vector};
 
 const CASES: usize = 100_000;
 const NO_HIT: f64 = 3.0e38f32 as f64;

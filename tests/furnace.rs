@@ -2,10 +2,11 @@
 
 mod common;
 
-use common::{U, image_bits, means, render_gpu, scene, scene_file, settings};
+use common::{render_gpu, scene, scene_file};
 use gpu_trace::film::Film;
 use gpu_trace::scene::Scene;
 use gpu_trace::settings::{GeometryChoice, Settings};
+use gpu_trace::verify::{U, image_bits, means, settings};
 
 /// Largest relative deviation of any pixel and channel from `expected`.
 fn deviation(film: &Film, expected: f64) -> f64 {

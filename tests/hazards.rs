@@ -6,11 +6,12 @@ mod common;
 
 use std::fmt::Write as _;
 
-use common::{means, render_cpu, render_gpu, scene, settings};
+use common::{leave, render_cpu, render_gpu, scene};
 use gpu_trace::film::Film;
 use gpu_trace::scene::Scene;
 use gpu_trace::settings::{Offset, Settings};
 use gpu_trace::statistics::{mean_and_error, normal_limit};
+use gpu_trace::verify::{means, settings};
 
 /// The share of values that may differ by more than 0.1 %: a path that passes within a rounding of a
 /// silhouette goes its own way, and takes its pixel along.
@@ -53,7 +54,7 @@ fn trouble(film: &Film, reference: &Film) -> Option<String> {
 fn check(name: &str, scene: &Scene, settings: &Settings) {
     let (film, reference) = (render_gpu(scene, settings), exact(scene, settings));
     if let Some(what) = trouble(&film, &reference) {
-        panic!("{name}: {what}");
+        panic!("{name}: {what}; {}", leave(name, &film, &reference));
     }
 }
 
@@ -183,8 +184,10 @@ fn a_moved_scene_is_the_same() {
         moved
     };
     for d in [1.0, 1.0e3, 1.0e5, f64::from(1 << 26)] {
-        if let Some(what) = trouble(&render_gpu(&at(d), &settings), &film) {
-            panic!("moved by {d}: {what}");
+        let moved = render_gpu(&at(d), &settings);
+        if let Some(what) = trouble(&moved, &film) {
+            let left = leave(&format!("moved by {d}"), &moved, &film);
+            panic!("moved by {d}: {what}; {left}");
         }
     }
     // Companion: moved without the camera.
@@ -254,7 +257,7 @@ fn furnaces_of_any_size_and_albedo_reach_their_radiance() {
             let (mean, error) = mean_and_error(&values);
             // The kernel's albedo is the f32 one; an f32 sum of as many terms as a path has.
             let expected = 1.0 / (1.0 - f64::from(albedo as f32));
-            let rounding = 2.0 * common::U / (1.0 - albedo);
+            let rounding = 2.0 * gpu_trace::verify::U / (1.0 - albedo);
             let off = |expected: f64| {
                 ((mean / expected - 1.0).abs() - rounding) * expected / error.max(1.0e-9)
             };

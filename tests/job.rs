@@ -4,11 +4,12 @@ mod common;
 
 use std::ops::Range;
 
-use common::{scene_file, settings};
+use common::scene_file;
 use gpu_trace::error::Error;
 use gpu_trace::job::prepare;
 use gpu_trace::scene::Scene;
 use gpu_trace::settings::{GeometryChoice, Integrator, Offset, Rect, Settings};
+use gpu_trace::verify::settings;
 
 type Change = fn(&mut Settings);
 

@@ -4,7 +4,7 @@ mod common;
 
 use std::mem::offset_of;
 
-use common::{EMPTY, scene};
+use common::scene;
 use glam::DVec3;
 use gpu_trace::effects::Effects;
 use gpu_trace::gpu::layout::{
@@ -12,10 +12,12 @@ use gpu_trace::gpu::layout::{
     SphereRecord,
 };
 use gpu_trace::gpu::probe::ShapeRecord;
+use gpu_trace::materials::{ALL, Form, Member, MemberKind, MemberValue, forms};
 use gpu_trace::placement::Placement;
-use gpu_trace::scene::{Material, MaterialKind};
+use gpu_trace::scene::Material;
 use gpu_trace::settings::Settings;
-use gpu_trace::shader::{Kernel, Stage, link};
+use gpu_trace::shader::{Kernel, Stage, link, material_members};
+use gpu_trace::verify::EMPTY;
 
 /// Name and offset of every member, and the size.
 type Layout = (Vec<(String, u32)>, u32);
@@ -35,7 +37,7 @@ fn kernel(stage: Stage, names: &[&str]) -> Kernel {
     let scene = scene(EMPTY);
     let settings = Settings::for_scene(&scene);
     let placement = Placement::new(&scene, settings.width, settings.height);
-    let effects = Effects::of(&scene, &placement, &settings, names);
+    let effects = Effects::named(names);
     link(stage, &scene, &placement, &effects).unwrap_or_else(|e| panic!("{e}"))
 }
 
@@ -75,8 +77,8 @@ fn check(name: &str, host: &Layout, kernel: &Kernel) {
 }
 
 /// Everything that fixed structs need.
-const FULL: [&str; 10] = [
-    "list", "bsdf", "pole", "interior", "lens", "diffuse", "emission", "lights", "table", "mis",
+const FULL: [&str; 9] = [
+    "list", "pole", "interior", "lens", "diffuse", "emission", "lights", "table", "mis",
 ];
 
 /// Structs that GLSL would lay out otherwise, and why. naga writes their members without offsets
@@ -143,7 +145,7 @@ fn glsl_has_the_same_layouts() {
     ];
     for set in 0..1 << optional.len() {
         let chosen = (0..optional.len()).filter(|i| set >> i & 1 == 1);
-        let mut names = vec!["list", "bsdf", "diffuse"];
+        let mut names = vec!["list", "diffuse"];
         names.extend(chosen.map(|i| optional[i]));
         let has = |name| names.contains(&name);
         if has("priority") && !has("dielectric") || has("dielectric") && !has("interior") {
@@ -261,12 +263,12 @@ fn the_probes_shape_agrees() {
         outputs,
         zero
     });
-    check("Shape", &shape, &kernel(Stage::Probe, &[]));
+    check("Shape", &shape, &kernel(Stage::Probe, &["list"]));
 }
 
 #[test]
 fn a_camera_without_lens_is_the_start_of_one_with_a_lens() {
-    let device = device(&kernel(Stage::Path, &["list", "bsdf"]), "Camera");
+    let device = device(&kernel(Stage::Path, &["list"]), "Camera");
     assert!(
         device.0.iter().all(|(name, _)| !name.contains("lens")),
         "{device:?}"
@@ -276,7 +278,7 @@ fn a_camera_without_lens_is_the_start_of_one_with_a_lens() {
 
 #[test]
 fn a_light_about_its_centre_is_the_start_of_one_about_its_pole() {
-    let names = ["list", "bsdf", "emission", "diffuse", "lights", "table"];
+    let names = ["list", "emission", "diffuse", "lights", "table"];
     let device = device(&kernel(Stage::Path, &names), "Light");
     assert!(
         device.0.iter().all(|(name, _)| name != "pole"),
@@ -305,103 +307,114 @@ fn companion_a_wrong_layout_is_found() {
     assert!(mismatch(&(good.0, good.1 + 16), &device, false).is_some());
 }
 
-/// Offsets and size of `Material` by WGSL's rules: name, align, size.
-fn material_by_the_rules(emission: bool, reflective: bool, dielectric: bool) -> Layout {
-    let members = [
-        (true, "color", 16, 12),
-        (true, "kind", 4, 4),
-        (emission, "emission", 16, 12),
-        (reflective, "specular", 16, 12),
-        (reflective, "epsilon", 4, 4),
-        (reflective, "mu", 4, 4),
-        (reflective, "lobe_weight", 4, 4),
-        (reflective, "color_weight", 4, 4),
-        (dielectric, "ior", 4, 4),
-    ];
+/// Offsets and size of a struct of these members by WGSL's rules.
+fn by_the_rules(members: &[Member]) -> Layout {
     let mut end: u32 = 0;
     let mut layout = Vec::new();
-    for (_, name, align, size) in members.into_iter().filter(|m| m.0) {
+    for member in members {
+        let (align, size) = match member.kind {
+            MemberKind::Vector => (16, 12),
+            MemberKind::Scalar | MemberKind::Word => (4, 4),
+        };
         let offset = end.next_multiple_of(align);
-        layout.push((name.to_owned(), offset));
+        layout.push((member.name.to_owned(), offset));
         end = offset + size;
     }
     (layout, end.next_multiple_of(16))
 }
 
+/// Sets of forms of materials: each alone, each two, and all.
+fn sets_of_forms() -> Vec<Vec<u32>> {
+    let codes = 0..forms().len() as u32;
+    let mut sets: Vec<Vec<u32>> = codes.clone().map(|code| vec![code]).collect();
+    let pairs = codes.clone().flat_map(|a| (0..a).map(move |b| vec![b, a]));
+    sets.extend(pairs);
+    sets.push(codes.collect());
+    sets
+}
+
+/// The bytes of a value.
+fn bytes_of(value: &MemberValue) -> Vec<u8> {
+    match value {
+        MemberValue::Vector(v) => bytemuck::cast_slice(&v[..]).to_vec(),
+        MemberValue::Scalar(x) => x.to_ne_bytes().to_vec(),
+        MemberValue::Word(x) => x.to_ne_bytes().to_vec(),
+    }
+}
+
+/// What is wrong with the record of `material` in the kernel of `members`, if anything is.
+fn wrong_record(material: &Material, members: &[Member], code: u32) -> Option<String> {
+    let (offsets, size) = by_the_rules(members);
+    let pairs: Vec<(Member, u32)> = std::iter::zip(members, &offsets)
+        .map(|(member, (_, offset))| (*member, *offset))
+        .collect();
+    let bytes = MaterialRecord::new(material, 2.0).bytes(&pairs, size);
+    let form = material.kind.form();
+    let mut values: Vec<(&str, MemberValue)> = vec![
+        ("color", material.kind.color().into()),
+        ("kind", MemberValue::Word(code)),
+        ("emission", (2.0 * material.emission).into()),
+    ];
+    let own = form.members.iter().map(|member| member.name);
+    values.extend(own.zip(material.kind.members()));
+    pairs.iter().find_map(|(member, offset)| {
+        // What other materials have is 0, or 1 for an index.
+        let neutral = match member.kind {
+            MemberKind::Vector => MemberValue::Vector([0.0; 3]),
+            MemberKind::Scalar => MemberValue::Scalar(if member.name == "ior" { 1.0 } else { 0.0 }),
+            MemberKind::Word => MemberValue::Word(0),
+        };
+        let own = values.iter().find(|(name, _)| *name == member.name);
+        let expected = bytes_of(own.map_or(&neutral, |(_, value)| value));
+        let found = &bytes[*offset as usize..][..expected.len()];
+        (found != expected).then(|| format!("{}: {found:?} for {expected:?}", member.name))
+    })
+}
+
 #[test]
-fn material_agrees_for_all_subsets() {
-    let value = |x: f64| DVec3::new(x, x + 0.125, x + 0.25);
-    let shiny = Material {
-        name: "shiny".into(),
-        kind: MaterialKind::Reflective {
-            albedo: value(0.5),
-            specular: value(0.25),
-            epsilon: 0.0625,
-            mu: 3.5,
-        },
-        emission: value(7.0),
-    };
-    let glass = Material {
-        kind: MaterialKind::Dielectric { ior: 1.75 },
-        ..shiny.clone()
-    };
-    for subset in 0..8 {
-        let [emission, reflective, dielectric] = [1, 2, 4].map(|bit| subset & bit != 0);
-        let mut names = vec!["list", "bsdf", "diffuse"];
-        let optional = [
-            (emission, "emission"),
-            (reflective, "reflective"),
-            (dielectric, "dielectric"),
-            (dielectric, "interior"),
-        ];
-        names.extend(
-            optional
-                .iter()
-                .filter(|(used, _)| *used)
-                .map(|(_, name)| *name),
-        );
-        let kernel = kernel(Stage::Path, &names);
-        let device = device(&kernel, "Material");
-        let rules = material_by_the_rules(emission, reflective, dielectric);
-        assert_eq!(device, rules, "{names:?}");
-
-        let scene = scene(EMPTY);
-        let settings = Settings::for_scene(&scene);
-        let placement = Placement::new(&scene, 1, 1);
-        let effects = Effects::of(&scene, &placement, &settings, &names);
-        let members: Vec<&str> = MaterialRecord::members(&effects).collect();
-        let expected: Vec<&str> = rules.0.iter().map(|(name, _)| name.as_str()).collect();
-        assert_eq!(members, expected, "{names:?}");
-
-        // Every value lies where the rules say.
-        for material in [&shiny, &glass] {
-            let bytes = MaterialRecord::new(material, 1.0).bytes(&device.0, device.1);
-            assert_eq!(bytes.len(), rules.1 as usize);
-            let word = |name: &str, i: usize| -> Option<f32> {
-                let (_, offset) = rules.0.iter().find(|(n, _)| n == name)?;
-                let at = *offset as usize + 4 * i;
-                Some(f32::from_ne_bytes(
-                    bytes[at..at + 4].try_into().expect("four bytes"),
-                ))
-            };
-            let is_glass = material.name == glass.name && material.kind == glass.kind;
-            assert_eq!(
-                word("kind", 0).map(f32::to_bits),
-                Some(if is_glass { 2 } else { 3 })
+fn material_agrees_for_all_forms() {
+    for codes in sets_of_forms() {
+        for emission in [false, true] {
+            let chosen: Vec<&Form> = codes.iter().map(|code| forms()[*code as usize]).collect();
+            let mut names = vec!["list"];
+            names.extend(chosen.iter().map(|form| form.name));
+            names.extend(emission.then_some("emission"));
+            names.extend(
+                chosen
+                    .iter()
+                    .any(|form| form.transmits)
+                    .then_some("interior"),
             );
-            assert_eq!(word("emission", 1), emission.then_some(7.125));
+            let members = material_members(&Effects::named(&names));
+            // Those of the forms, each once, and what all have.
+            let mut wanted: Vec<Member> = vec![Member::vector("color"), Member::word("kind")];
+            wanted.extend(emission.then_some(Member::vector("emission")));
+            for member in chosen.iter().flat_map(|form| form.members) {
+                if !wanted.contains(member) {
+                    wanted.push(*member);
+                }
+            }
+            assert_eq!(members.len(), wanted.len(), "{names:?}: {members:?}");
+            assert!(wanted.iter().all(|m| members.contains(m)), "{members:?}");
+            let kernel = kernel(Stage::Path, &names);
             assert_eq!(
-                word("ior", 0),
-                dielectric.then_some(if is_glass { 1.75 } else { 1.0 })
+                device(&kernel, "Material"),
+                by_the_rules(&members),
+                "{names:?}"
             );
-            if !is_glass {
-                assert_eq!(word("color", 2), Some(0.75));
-                assert_eq!(word("specular", 1), reflective.then_some(0.375));
-                assert_eq!(word("epsilon", 0), reflective.then_some(0.0625));
-                assert_eq!(word("mu", 0), reflective.then_some(3.5));
-                // Luminance of (0.5, 0.625, 0.75).
-                let weight = (0.2126 * 0.5 + 0.7152 * 0.625 + 0.0722 * 0.75) as f32;
-                assert_eq!(word("color_weight", 0), reflective.then_some(weight));
+
+            // Every value lies where the rules say.
+            for kind in ALL.iter().flat_map(|material| (material.cases)()) {
+                let code = forms().iter().position(|form| *form == kind.form());
+                let code = code.expect("a form of the list") as u32;
+                let material = Material {
+                    name: "m".into(),
+                    emission: DVec3::new(7.0, 7.125, 7.25),
+                    kind,
+                };
+                assert_eq!(wrong_record(&material, &members, code), None, "{names:?}");
+                // Companion: another code.
+                assert!(wrong_record(&material, &members, code + 1).is_some());
             }
         }
     }
@@ -410,9 +423,9 @@ fn material_agrees_for_all_subsets() {
 #[test]
 fn attributes_agree() {
     for (names, expected) in [
-        (&["list", "bsdf", "diffuse"][..], vec![("material", 0)]),
+        (&["list", "diffuse"][..], vec![("material", 0)]),
         (
-            &["list", "bsdf", "diffuse", "interior"],
+            &["list", "diffuse", "interior"],
             vec![("material", 0), ("side", 4)],
         ),
     ] {

@@ -2,13 +2,14 @@
 
 mod common;
 
-use common::{gpu, job, render_gpu, scene, scene_file, settings};
+use common::{gpu, job, render_gpu, scene, scene_file};
 use gpu_trace::backend::Backend;
 use gpu_trace::film::Estimate;
 use gpu_trace::job::prepare;
 use gpu_trace::ledger::{Entry, audit};
 use gpu_trace::scene::Scene;
 use gpu_trace::settings::{Integrator, Offset, Settings};
+use gpu_trace::verify::settings;
 
 fn entries(backend: &Backend, scene: &Scene, settings: &Settings) -> Vec<Entry> {
     let film = render_gpu(scene, settings);

@@ -5,16 +5,16 @@ mod common;
 
 use std::f64::consts::TAU;
 
-use common::{ULP, means, probe, render_cpu, render_gpu, scene, settings, to_row, vector};
-use gpu_trace::check::Random;
+use common::{probe, render_cpu, render_gpu, scene};
 use gpu_trace::film::Film;
 use gpu_trace::placement::Placement;
 use gpu_trace::placement::lights::MOST_WEIGHED;
 use gpu_trace::reference::light::aim::{aim_center, cone_height};
-use gpu_trace::reference::light::sphere::power_weight;
+use gpu_trace::reference::light::sphere::mis_weight;
 use gpu_trace::scene::{Scene, Sphere};
 use gpu_trace::settings::{Integrator, LightSampling, Settings};
 use gpu_trace::statistics::{chi_square, mean_and_error, sidak};
+use gpu_trace::verify::{Random, ULP, means, settings, to_row, vector};
 
 const LIGHTS: [&str; 5] = ["baked", "emission", "lights", "table", "mis"];
 
@@ -109,12 +109,12 @@ fn weights_share_all_that_there_is() {
         })
         .collect();
     let outputs: Vec<[f32; 4]> = probe(&LIGHTS)
-        .call("power_weight", &inputs)
+        .call("mis_weight", &inputs)
         .expect("the probe runs");
     for (pair, inputs) in outputs.chunks_exact(2).zip(inputs.chunks_exact(2)) {
         let sum = f64::from(pair[0][0]) + f64::from(pair[1][0]);
         assert!((sum - 1.0).abs() <= 16.0 * ULP, "{inputs:?}: {sum}");
-        let twin = power_weight(f64::from(inputs[0][0]), f64::from(inputs[0][1]));
+        let twin = mis_weight(f64::from(inputs[0][0]), f64::from(inputs[0][1]));
         assert!((f64::from(pair[0][0]) - twin).abs() <= 8.0 * ULP);
     }
 }

@@ -8,9 +8,7 @@ use std::cell::RefCell;
 use std::ops::Range;
 use std::time::Duration;
 
-use common::{
-    gpu_renderer, job, means, render_cpu, render_gpu, scene, scene_file, scene_files, settings,
-};
+use common::{gpu_renderer, job, render_cpu, render_gpu, scene, scene_file, scene_files};
 use gpu_trace::effects::{Effect, Effects};
 use gpu_trace::error::{Error, Result};
 use gpu_trace::film::{Film, PixelSums, Tally, Tiles, Window};
@@ -23,6 +21,7 @@ use gpu_trace::scene::Scene;
 use gpu_trace::settings::{GeometryChoice, Integrator, LightSampling, Rect, Settings};
 use gpu_trace::shader::steps::{LOOPS, vertex_steps};
 use gpu_trace::shader::{Kernel, Stage, link};
+use gpu_trace::verify::{means, settings};
 
 /// A closed furnace that keeps all light.
 const FURNACE: &str = "
@@ -45,7 +44,7 @@ const FURNACE: &str = "
 
 /// Many spheres in a cube under a sky.
 fn cloud(count: u32) -> String {
-    let mut random = gpu_trace::check::Random::new("cloud");
+    let mut random = gpu_trace::verify::Random::new("cloud");
     let mut text = String::from(
         "
         [camera]

@@ -7,11 +7,12 @@ mod thorough;
 use std::time::Duration;
 
 use cli_support::{BLACK, Folder, holds};
-use common::{gpu_renderer, job, scene_file, settings};
+use common::{gpu_renderer, job, scene_file};
 use gpu_trace::forecast::{self, Pilot};
 use gpu_trace::render::render_quietly;
 use gpu_trace::sampler::Sampler;
 use gpu_trace::settings::Settings;
+use gpu_trace::verify::settings;
 use serde_json::Value;
 use thorough::thorough;
 

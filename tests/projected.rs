@@ -5,14 +5,14 @@ mod common;
 
 use std::f64::consts::PI;
 
-use common::{Agreement, Row, ULP, Wall, probe, to_row, vector, walled};
+use common::{Wall, probe, walled};
 use glam::{DVec2, DVec3};
-use gpu_trace::check::Random;
 use gpu_trace::reference::light::aim::{Aim, aim_center};
 use gpu_trace::reference::light::projected::{
     Cap, cap_seen, sample_cap, segment_area, segment_point,
 };
 use gpu_trace::statistics::{chi_square, mean_and_error, normal_limit, sidak};
+use gpu_trace::verify::{Agreement, Random, Row, ULP, to_row, vector};
 
 const PROJECTED: [&str; 6] = ["baked", "pole", "emission", "lights", "projected", "mis"];
 

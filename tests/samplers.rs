@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{gpu_renderer, image_bits, means, render_cpu, render_gpu, scene_file, settings};
+use common::{gpu_renderer, render_cpu, render_gpu, scene_file};
 use glam::DVec3;
 use gpu_trace::film::{Film, window_end};
 use gpu_trace::gpu::renderer::DispatchLimits;
@@ -14,6 +14,7 @@ use gpu_trace::sampler::Sampler;
 use gpu_trace::scene::Scene;
 use gpu_trace::settings::{Rect, Settings};
 use gpu_trace::statistics::mean_and_error;
+use gpu_trace::verify::{image_bits, means, settings};
 
 const SAMPLERS: [Sampler; 2] = [Sampler::Independent, Sampler::Sobol];
 
@@ -276,7 +277,10 @@ fn samples_are_a_function_of_seed_pixel_and_index() {
                         .sum();
                     let mean = sum / film.samples() as f64;
                     let off = (film.mean(i)[c] - mean).abs();
-                    assert!(off <= 2.0 * common::U * mean, "{sampler:?}, pixel {i}");
+                    assert!(
+                        off <= 2.0 * gpu_trace::verify::U * mean,
+                        "{sampler:?}, pixel {i}"
+                    );
                 }
             }
         }

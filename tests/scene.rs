@@ -5,9 +5,11 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 use gpu_trace::error::Error;
+use gpu_trace::materials::MaterialKind;
+use gpu_trace::materials::dielectric::Dielectric;
 use gpu_trace::placement::Placement;
 use gpu_trace::scene::load::{load_file, load_str};
-use gpu_trace::scene::{Handedness, MaterialKind, builtin, summary};
+use gpu_trace::scene::{Handedness, builtin, summary};
 
 /// A scene without mistakes. Every case below changes one place of it.
 const GOOD: &str = r#"[camera]
@@ -103,7 +105,7 @@ fn the_good_scene_is_read_as_written() {
     assert_eq!(names, ["white", "glass", "shiny"], "in file order");
     assert_eq!(
         scene.materials[1].kind,
-        MaterialKind::Dielectric { ior: 1.5 }
+        MaterialKind::from(Dielectric { ior: 1.5 })
     );
     assert_eq!(scene.materials[0].emission, DVec3::splat(2.0));
     assert_eq!(scene.spheres[1].priority, Some(2));

@@ -4,13 +4,13 @@
 mod common;
 
 use common::probe;
-use gpu_trace::check::Random;
 use gpu_trace::reference::core::random::{random_words, sample_key, unit_float};
 use gpu_trace::reference::core::sobol::{
     owen_scramble, shuffled, sobol_point, sobol_words, sobol4,
 };
 use gpu_trace::settings::stream_words;
 use gpu_trace::statistics::{SIGNIFICANCE, correlation, mean_and_error, sidak, uniform_ks};
+use gpu_trace::verify::Random;
 
 /// Last places of the scrambles that a render has.
 const LASTS: [u32; 3] = [3, 15, 63];

@@ -3,10 +3,10 @@
 mod common;
 
 use common::probe;
-use gpu_trace::check::Random;
 use gpu_trace::reference::core::random::{mix_bits, sample_key, unit_float};
 use gpu_trace::settings::stream_words;
 use gpu_trace::statistics::{SIGNIFICANCE, correlation, sidak, uniform_ks};
+use gpu_trace::verify::Random;
 
 /// Where, and which: the two rows of the probe's `random4`.
 type Key = [[u32; 4]; 2];
@@ -132,7 +132,7 @@ fn the_high_word_of_the_sample_index_matters() {
 
 #[test]
 fn the_largest_number_is_below_one() {
-    assert_eq!(unit_float([u32::MAX; 4]), [1.0 - common::U; 4]);
+    assert_eq!(unit_float([u32::MAX; 4]), [1.0 - gpu_trace::verify::U; 4]);
     assert!((unit_float([u32::MAX; 4])[0] as f32) < 1.0);
 }
 

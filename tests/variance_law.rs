@@ -11,13 +11,14 @@
 
 mod common;
 
-use common::{job, render_cpu, render_gpu, scene, settings};
+use common::{job, render_cpu, render_gpu, scene};
 use gpu_trace::film::Film;
 use gpu_trace::sampler::Sampler;
 use gpu_trace::scene::Scene;
 use gpu_trace::settings::{Integrator, Settings};
 use gpu_trace::statistics::{mean_and_error, normal_limit};
-use gpu_trace::variance::{VarianceClass, variance_class};
+use gpu_trace::variance::VarianceClass;
+use gpu_trace::verify::settings;
 
 /// The camera inside a closed sphere that emits 1.
 fn closed(material: &str) -> Scene {

@@ -5,11 +5,11 @@ mod common;
 
 use std::f64::consts::PI;
 
-use common::{Agreement, Row, ULP, probe, to_row, vector, walled};
+use common::{probe, walled};
 use glam::{DVec2, DVec3};
-use gpu_trace::check::Random;
 use gpu_trace::reference::light::aim::{Aim, aim_center, aim_pole, cone_height};
 use gpu_trace::reference::light::projected::{cap_seen, sample_cap};
+use gpu_trace::verify::{Agreement, Random, Row, ULP, to_row, vector};
 
 const PROJECTED: [&str; 6] = ["baked", "pole", "emission", "lights", "projected", "mis"];
 

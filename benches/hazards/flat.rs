@@ -1,7 +1,8 @@
 //! A scene as plain programs want it: world coordinates, one record a sphere.
 
 use glam::DVec3;
-use gpu_trace::scene::{Handedness, MaterialKind, Scene};
+use gpu_trace::materials::MaterialKind;
+use gpu_trace::scene::{Handedness, Scene};
 
 /// How a surface scatters.
 #[derive(Clone, Copy, PartialEq, serde::Serialize)]
@@ -48,8 +49,8 @@ fn ior_around(scene: &Scene, index: usize) -> f64 {
             outer.radius > inner.radius
                 && (outer.center - inner.center).length() < outer.radius - inner.radius + 1.0e-12
         })
-        .filter_map(|outer| match scene.materials[outer.material].kind {
-            MaterialKind::Dielectric { ior } => Some((outer.radius, ior)),
+        .filter_map(|outer| match &scene.materials[outer.material].kind {
+            MaterialKind::Dielectric(glass) => Some((outer.radius, glass.ior)),
             _ => None,
         })
         .min_by(|a, b| a.0.total_cmp(&b.0))
@@ -61,11 +62,11 @@ impl FlatScene {
         let spheres = (0..scene.spheres.len()).map(|i| {
             let sphere = &scene.spheres[i];
             let material = &scene.materials[sphere.material];
-            let (kind, color, ior) = match material.kind {
-                MaterialKind::Diffuse { albedo } => (Kind::Diffuse, albedo, 1.0),
-                MaterialKind::Mirror { reflectance } => (Kind::Mirror, reflectance, 1.0),
-                MaterialKind::Dielectric { ior } => (Kind::Dielectric, DVec3::ONE, ior),
-                MaterialKind::Reflective { .. } => panic!("no hazard scene has this material"),
+            let (kind, color, ior) = match &material.kind {
+                MaterialKind::Diffuse(m) => (Kind::Diffuse, m.albedo, 1.0),
+                MaterialKind::Mirror(m) => (Kind::Mirror, m.reflectance, 1.0),
+                MaterialKind::Dielectric(m) => (Kind::Dielectric, DVec3::ONE, m.ior),
+                other => panic!("no hazard scene has {}", other.name()),
             };
             FlatSphere {
                 center: sphere.center.to_array(),

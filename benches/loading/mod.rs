@@ -3,7 +3,6 @@
 use std::fmt::Write as _;
 use std::time::Instant;
 
-use gpu_trace::check::Random;
 use gpu_trace::effects::Effects;
 use gpu_trace::gpu::device::Gpu;
 use gpu_trace::gpu::renderer::GpuRenderer;
@@ -11,6 +10,7 @@ use gpu_trace::job::prepare;
 use gpu_trace::placement::Placement;
 use gpu_trace::scene::load::load_str;
 use gpu_trace::settings::Settings;
+use gpu_trace::verify::Random;
 
 /// Spheres of each scene.
 const COUNTS: [usize; 3] = [1_000, 10_000, 100_000];

@@ -5,7 +5,8 @@ use std::time::Instant;
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 use gpu_trace::gpu::device::{self, DeviceChoice};
-use gpu_trace::scene::{Handedness, MaterialKind, Scene};
+use gpu_trace::materials::MaterialKind;
+use gpu_trace::scene::{Handedness, Scene};
 use wgpu::util::DeviceExt as _;
 
 #[derive(Clone, Copy, Pod, Zeroable)]
@@ -41,13 +42,13 @@ pub(crate) fn contestant(scene: &Scene, spp: u64) -> Box<dyn FnMut() -> (f64, f6
         .iter()
         .map(|sphere| {
             let material = &scene.materials[sphere.material];
-            let MaterialKind::Diffuse { albedo } = material.kind else {
+            let MaterialKind::Diffuse(diffuse) = &material.kind else {
                 panic!("the baseline knows diffuse materials only")
             };
             Sphere {
                 center: sphere.center.as_vec3().to_array(),
                 radius: sphere.radius as f32,
-                albedo: four(albedo),
+                albedo: four(diffuse.albedo),
                 emission: four(material.emission),
             }
         })

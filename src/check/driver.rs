@@ -1,9 +1,9 @@
 //! What a driver makes of f32 arithmetic: WGSL leaves much of it open.
 
 use super::context::Context;
-use super::inputs::Random;
 use crate::error::Result;
 use crate::gpu::probe::Probe;
+use crate::verify::Random;
 
 /// What was seen of a driver's f32 arithmetic.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]

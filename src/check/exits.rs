@@ -2,9 +2,9 @@
 //! leak out of a closed one. The comparison of `docs/numerics.md`.
 
 use super::context::Context;
-use super::inputs::Random;
-use super::intersection::{NO_HIT, Row, bounce, bounce_rows, leaving, normal_at_hit, vector};
+use super::intersection::{NO_HIT, bounce, bounce_rows, leaving, normal_at_hit};
 use crate::error::Result;
+use crate::verify::{Random, Row, vector};
 
 /// Above this radius the sphere is a wall, seen from a distance of 1; below, a ball, seen from a few
 /// radii.

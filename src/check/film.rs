@@ -1,9 +1,8 @@
 //! Cases 32 to 37: samples, their sums, and images of any size. Integers and bits: most of the limits
 //! are 0.
 
-use super::context::{Context, SceneText, image_bits, means, share_off};
-use super::inputs::Random;
-use super::{Case, Measure, Run};
+use super::context::Context;
+use super::{Case, Run};
 use crate::error::{Error, Result};
 use crate::film::Film;
 use crate::gpu::device::Gpu;
@@ -14,6 +13,7 @@ use crate::render::render_quietly;
 use crate::scene::Scene;
 use crate::settings::{Rect, Settings, stream_words};
 use crate::statistics::{correlation, sidak, uniform_ks};
+use crate::verify::{Measure, Random, SceneText, image_bits, means, share_off};
 
 pub(super) const CASES: &[Case] = &[
     Case {
@@ -59,7 +59,7 @@ pub(super) const CASES: &[Case] = &[
 ];
 
 /// Something of everything that a path can meet, in a bright environment.
-fn mixed(context: &Context) -> Result<Scene> {
+fn mixed() -> Result<Scene> {
     SceneText::new([0.0, 0.0, 4.0], [0.0, 0.0, 0.0])
         .environment(0.5)
         .diffuse("floor", 0.6, 0.0)
@@ -70,7 +70,7 @@ fn mixed(context: &Context) -> Result<Scene> {
         .sphere([0.0, 1.6, -0.5], 0.4, "lamp")
         .sphere([-0.5, -0.3, 0.5], 0.6, "glass")
         .sphere([0.8, -0.4, -0.3], 0.6, "mirror")
-        .load(context)
+        .load()
 }
 
 /// Settings for a whole image.
@@ -289,7 +289,7 @@ fn sample_indices(context: &Context) -> Result<Measure> {
             format!("sample key {at:?}: {numbers:?}")
         });
     }
-    let scene = mixed(context)?;
+    let scene = mixed()?;
     let edges: &[u64] = context.size(&[1 << 32][..], &[1 << 16, 1 << 32, (1 << 48) - 16][..]);
     for edge in edges {
         let settings = Settings {
@@ -344,7 +344,7 @@ fn compare_crop(
 }
 
 fn odd_sizes(context: &Context) -> Result<Measure> {
-    let scene = mixed(context)?;
+    let scene = mixed()?;
     let mut measure = Measure::new(0.0, "values");
     let mut sizes = vec![[1, 1], [7, 5], [8191, 1]];
     if !context.options.quick {
@@ -378,7 +378,7 @@ fn odd_sizes(context: &Context) -> Result<Measure> {
 }
 
 fn seams(context: &Context) -> Result<Measure> {
-    let scene = mixed(context)?;
+    let scene = mixed()?;
     let mut measure = Measure::new(0.0, "values");
     let across = Rect {
         x: 1000,
@@ -442,7 +442,7 @@ fn renderer(gpu: Gpu, scene: &Scene, settings: &Settings) -> Result<GpuRenderer>
 }
 
 fn dispatches(context: &Context) -> Result<Measure> {
-    let scene = mixed(context)?;
+    let scene = mixed()?;
     let settings = Settings {
         samples: 3..67,
         ..sized(context, &scene, [41, 33], 1)

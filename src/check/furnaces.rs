@@ -2,13 +2,13 @@
 
 use std::f64::consts::PI;
 
-use super::context::{Context, SceneText, means};
-use super::intersection::ULP;
+use super::context::Context;
 use super::lights::sine;
-use super::{Case, Measure, Run};
+use super::{Case, Run};
 use crate::error::Result;
 use crate::settings::Settings;
 use crate::statistics::normal_limit;
+use crate::verify::{Measure, SceneText, ULP, means};
 
 pub(super) const CASES: &[Case] = &[Case {
     id: 26,
@@ -55,7 +55,7 @@ fn white(context: &Context, radius: f64, measure: &mut Measure) -> Result<()> {
         .sphere(at(-1.15, 0.9), radius, "chalk")
         .sphere(at(1.15, 0.9), radius, "mirror")
         .sphere(at(0.0, -1.15), radius, "glass")
-        .load(context)?;
+        .load()?;
     let settings = Settings {
         // Near grazing incidence light stays in glass for a while.
         max_bounces: 1024,
@@ -76,7 +76,7 @@ fn gray(context: &Context, radius: f64, measure: &mut Measure) -> Result<()> {
         .environment(1.0)
         .diffuse("gray", 0.7, 0.0)
         .sphere([0.0; 3], radius, "gray")
-        .load(context)?;
+        .load()?;
     let film = context.render(&scene, &context.settings(&scene, SIDE, 16))?;
     let truth = f64::from(0.7f32) * context.disturbed(1.0e-4);
     for (i, mean) in means(&film).iter().enumerate() {
@@ -98,7 +98,7 @@ fn lossy(context: &Context, radius: f64, measure: &mut Measure) -> Result<()> {
         .environment(1.0)
         .material("glossy", members)
         .sphere([0.0; 3], radius, "glossy")
-        .load(context)?;
+        .load()?;
     let film = context.render(&scene, &context.settings(&scene, SIDE, 256))?;
     let pixels = film.rect().pixels();
     let lobe = 10.0 * PI * 0.01 * 1.99;

@@ -1,8 +1,8 @@
 //! Cases 29 to 31, 38 and 39: light transport whose outcome is known.
 
-use super::context::{Context, SceneText, means};
+use super::context::Context;
 use super::film::must;
-use super::{Case, Measure, Run};
+use super::{Case, Run};
 use crate::error::Result;
 use crate::film::{BLOCK, Film};
 use crate::job::prepare;
@@ -11,6 +11,7 @@ use crate::scene::Scene;
 use crate::settings::{Integrator, Settings};
 use crate::statistics::mean_and_error;
 use crate::variance::VarianceClass;
+use crate::verify::{Measure, SceneText, means};
 
 pub(super) const CASES: &[Case] = &[
     Case {
@@ -82,7 +83,7 @@ fn furnaces(context: &Context) -> Result<Measure> {
     }
     let mut measure = Measure::new(1.0, "of 2 N u");
     for (albedo, radius) in all {
-        let scene = closed(albedo, 1.0, radius).load(context)?;
+        let scene = closed(albedo, 1.0, radius).load()?;
         let settings = Settings {
             roulette: false,
             ..context.settings(&scene, 8, 8)
@@ -106,7 +107,7 @@ fn furnaces(context: &Context) -> Result<Measure> {
 }
 
 /// A gray scene where roulette matters: glass and a lamp over a dark floor.
-fn gray(context: &Context) -> Result<Scene> {
+fn gray() -> Result<Scene> {
     SceneText::new([0.0, 0.0, 4.0], [0.0, 0.0, 0.0])
         .environment(0.5)
         .diffuse("floor", 0.4, 0.0)
@@ -115,12 +116,12 @@ fn gray(context: &Context) -> Result<Scene> {
         .sphere([0.0, -1001.0, 0.0], 1000.0, "floor")
         .sphere([0.7, -0.5, 0.0], 0.5, "lamp")
         .sphere([-0.5, -0.4, 0.3], 0.6, "glass")
-        .load(context)
+        .load()
 }
 
 fn roulette(context: &Context) -> Result<Measure> {
     let mut measure = Measure::new(3.9, "standard errors");
-    for scene in [closed(0.5, 1.0, 1.0).load(context)?, gray(context)?] {
+    for scene in [closed(0.5, 1.0, 1.0).load()?, gray()?] {
         let on = Settings {
             ..context.settings(&scene, 32, context.size(64, 1024))
         };
@@ -160,7 +161,7 @@ fn weights(context: &Context, albedo: f64, measure: &mut Measure) -> Result<()> 
         .diffuse("lamp", 0.0, 1.0)
         .sphere([0.0; 3], 1.0, "wall")
         .sphere([0.0; 3], 0.4, "lamp")
-        .load(context)?;
+        .load()?;
     // With light sampling, a sample would be a sum over the vertices of its path.
     let settings = Settings {
         integrator: Integrator::Bsdf,
@@ -184,7 +185,7 @@ fn weights(context: &Context, albedo: f64, measure: &mut Measure) -> Result<()> 
 
 /// A closed sphere that reflects everything: every path goes on to the limit.
 fn lossless(context: &Context, measure: &mut Measure) -> Result<()> {
-    let scene = closed(context.disturbed(-0.01), 1.0, 1.0).load(context)?;
+    let scene = closed(context.disturbed(-0.01), 1.0, 1.0).load()?;
     let settings = Settings {
         max_bounces: 200,
         ..context.settings(&scene, 8, 8)
@@ -232,7 +233,7 @@ fn extremes(context: &Context) -> Result<Measure> {
         ]);
     }
     for (name, albedo, emission, radius, bounces) in known {
-        let scene = closed(albedo, emission, radius).load(context)?;
+        let scene = closed(albedo, emission, radius).load()?;
         let settings = Settings {
             max_bounces: bounces,
             roulette: false,
@@ -284,7 +285,7 @@ fn zoos(context: &Context) -> Result<Vec<(&'static str, Scene)>> {
         .sphere([-0.8, 0.0, 0.0], 0.5, "needle")
         .sphere([0.8, 0.0, 0.0], 0.5, "narrow")
         .sphere([0.0, -1.0 - 1.0e12, 0.0], 1.0e12, "wide")
-        .load(context)?;
+        .load()?;
     let glass = base()
         .dielectric("dense", 10.0)
         .dielectric("thin", 0.1)
@@ -296,7 +297,7 @@ fn zoos(context: &Context) -> Result<Vec<(&'static str, Scene)>> {
         .sphere([0.0, 0.0, 0.5], 0.3, "above")
         .sphere([0.0, -0.8, 0.0], 0.3, "below")
         .sphere([0.0, 0.0, 2.0], 0.1, "none")
-        .load(context)?;
+        .load()?;
     Ok(vec![("reflective", reflective), ("glass", glass)])
 }
 
@@ -334,7 +335,7 @@ fn light_in_glass(context: &Context) -> Result<Measure> {
     for (radius, ior, camera) in all {
         let square = ior * ior;
         let emission = square * context.disturbed(0.1);
-        let scene = lamp_in_glass(radius, ior, camera, emission).load(context)?;
+        let scene = lamp_in_glass(radius, ior, camera, emission).load()?;
         let settings = Settings {
             // Grazing paths are in the glass for long.
             max_bounces: 1000,
@@ -378,7 +379,7 @@ fn variance_law(context: &Context) -> Result<Measure> {
     }
     let mut measure = Measure::new(3.9, "standard errors");
     for (rho, p) in all {
-        let scene = closed(rho, 1.0, 1.0).load(context)?;
+        let scene = closed(rho, 1.0, 1.0).load()?;
         let settings = Settings {
             integrator: Integrator::Lecture { termination: p },
             // The law is one of independent samples.
@@ -426,7 +427,7 @@ fn classes(context: &Context, measure: &mut Measure) -> Result<()> {
         (0.78, Infinite),
     ];
     for (rho, wanted) in steps {
-        let scene = closed(context.disturbed(0.2) * rho, 1.0, 1.0).load(context)?;
+        let scene = closed(context.disturbed(0.2) * rho, 1.0, 1.0).load()?;
         let settings = Settings {
             integrator: Integrator::Lecture { termination: 0.2 },
             ..context.settings(&scene, 1, 1)

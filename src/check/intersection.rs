@@ -5,12 +5,12 @@
 use glam::DVec3;
 
 use super::context::Context;
-use super::inputs::Random;
-use super::{Case, Measure, Run};
+use super::{Case, Run};
 use crate::error::Result;
 use crate::reference::scene::sphere::{
     Quadratic, pole_quadratic, root_interior, root_outside, sphere_quadratic,
 };
+use crate::verify::{Measure, Random, Row, ULP, to_row, vector};
 
 pub(super) const CASES: &[Case] = &[
     Case {
@@ -64,24 +64,11 @@ pub(super) const CASES: &[Case] = &[
     },
 ];
 
-pub(super) type Row = [f32; 4];
-
 pub(super) const NO_HIT: f64 = 3.0e38f32 as f64;
-
-/// Twice the unit roundoff: the largest relative error of an f32 operation, rounded either way.
-pub(super) const ULP: f64 = 1.0 / (1 << 23) as f64;
 
 /// The distance of f32 numbers of the size of x.
 pub(super) fn ulp(x: f64) -> f64 {
     (x.abs().log2().floor() - 23.0).exp2()
-}
-
-pub(super) fn to_row(v: DVec3, w: f64) -> Row {
-    [v.x as f32, v.y as f32, v.z as f32, w as f32]
-}
-
-pub(super) fn vector(row: Row) -> DVec3 {
-    DVec3::new(f64::from(row[0]), f64::from(row[1]), f64::from(row[2]))
 }
 
 /// A ray from distance `distance` whose line passes the centre at `impact`: origin and direction.

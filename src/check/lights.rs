@@ -3,14 +3,14 @@
 //! What light sampling knows of a light is measured function by function, the rest in whole images.
 //! Their truth is known exactly, or comes from the same paths in f64.
 
-use super::context::{Context, SceneText, means};
-use super::intersection::ULP;
-use super::{Case, Measure, Run, sampled};
+use super::context::Context;
+use super::{Case, Run, sampled};
 use crate::error::Result;
 use crate::film::Film;
 use crate::scene::Scene;
 use crate::settings::{Integrator, Settings};
 use crate::statistics::normal_limit;
+use crate::verify::{Measure, SceneText, ULP, means};
 
 pub(super) const CASES: &[Case] = &[
     Case {
@@ -115,7 +115,7 @@ fn furnace(context: &Context, radius: f64, measure: &mut Measure) -> Result<()> 
     let scene = hollow(radius)
         .diffuse("wall", albedo, 1.0)
         .diffuse("ball", albedo, 1.0)
-        .load(context)?;
+        .load()?;
     // BSDF sampling, in which every direction hits: with light sampling the balls, which emit as well,
     // would be found in two ways, whose sum has a variance.
     let settings = Settings {
@@ -153,7 +153,7 @@ fn contrast(context: &Context, measure: &mut Measure) -> Result<()> {
         let scene = hollow(radius)
             .diffuse("wall", 0.0, 1.0)
             .diffuse("ball", 0.5, 0.0)
-            .load(context)?;
+            .load()?;
         let settings = Settings {
             roulette: false,
             ..context.settings(&scene, SIDE, spp)
@@ -209,7 +209,7 @@ fn alone(context: &Context, radius: f64, number: usize, measure: &mut Measure) -
     let text = SceneText::new([0.0, 0.0, distance * radius], [0.0; 3]);
     let scene = emitter(text, number)
         .sphere([0.0; 3], radius, "lamp")
-        .load(context)?;
+        .load()?;
     let spp = 64;
     let film = context.render(&scene, &context.settings(&scene, SIDE, spp))?;
     for i in 0..film.rect().pixels() {
@@ -244,7 +244,7 @@ fn two_sides(context: &Context, emissions: [f64; 2]) -> Result<(Scene, Settings)
             .sphere([x, 1.2, 0.0], 0.8, name)
             .sphere([x, -0.8, 0.0], 1.1, "gray");
     }
-    let scene = text.load(context)?;
+    let scene = text.load()?;
     // Which light is sampled depends on how strong the others are: only by BSDF sampling do the paths
     // not know of it.
     let settings = Settings {

@@ -8,9 +8,7 @@ use std::f64::consts::{PI, TAU};
 use glam::{DVec2, DVec3};
 
 use super::context::Context;
-use super::inputs::Random;
-use super::intersection::{Row, ULP, to_row, vector};
-use super::{Case, Measure, Run};
+use super::{Case, Run};
 use crate::error::Result;
 use crate::gpu::bsdf_probe::{BsdfInput, Evaluated, Sampled};
 use crate::gpu::probe::Probe;
@@ -19,6 +17,7 @@ use crate::materials::reflective::Reflective;
 use crate::materials::{Event, MaterialKind, Surface};
 use crate::reference::core::sampling::{basis_around, cap_direction};
 use crate::settings::Integrator;
+use crate::verify::{Measure, Random, Row, ULP, to_row, vector};
 
 pub(super) const CASES: &[Case] = &[
     Case {

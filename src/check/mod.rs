@@ -10,7 +10,6 @@ mod driver;
 mod exits;
 mod film;
 mod furnaces;
-mod inputs;
 mod integrator;
 mod intersection;
 mod lights;
@@ -19,10 +18,10 @@ mod placing;
 mod sampled;
 mod sampling;
 
+pub use crate::verify::Measure;
 pub use context::Context;
 pub use driver::{DriverReport, probe_driver};
 pub use exits::{Exits, exits};
-pub use inputs::Random;
 
 use crate::error::Result;
 use crate::settings::Offset;
@@ -76,59 +75,6 @@ pub fn cases() -> Vec<Case> {
     let mut all = groups.concat();
     all.sort_by_key(|case| case.id);
     all
-}
-
-/// Errors of many trials against a limit.
-#[derive(Clone, Debug)]
-pub struct Measure {
-    trials: u64,
-    failures: u64,
-    worst: f64,
-    limit: f64,
-    unit: &'static str,
-    place: String,
-}
-
-impl Measure {
-    /// No trials yet; errors of at most `limit` pass, in `unit`.
-    #[must_use]
-    pub fn new(limit: f64, unit: &'static str) -> Self {
-        Self {
-            trials: 0,
-            failures: 0,
-            worst: 0.0,
-            limit,
-            unit,
-            place: String::new(),
-        }
-    }
-
-    /// Takes note of a trial; no number is an error without bound. `place` says which it was.
-    pub fn add(&mut self, error: f64, place: impl FnOnce() -> String) {
-        let error = if error.is_nan() { f64::INFINITY } else { error };
-        self.trials += 1;
-        self.failures += u64::from(error > self.limit);
-        if error > self.worst {
-            self.worst = error;
-            self.place = place();
-        }
-    }
-
-    /// Takes note of `failures` of `trials` whose error is a plain yes or no; the limit is to be 0.
-    pub fn count(&mut self, trials: u64, failures: u64, place: impl FnOnce() -> String) {
-        self.trials += trials;
-        self.failures += failures;
-        if failures > 0 && self.place.is_empty() {
-            self.place = place();
-        }
-        self.worst = self.worst.max(self.failures as f64);
-    }
-
-    /// Whether there were trials and none failed.
-    #[must_use]
-    pub fn passes(&self) -> bool {
-        self.trials > 0 && self.failures == 0
-    }
 }
 
 /// What became of a case.
@@ -198,14 +144,14 @@ impl Case {
                 } else {
                     Verdict::Fail
                 };
-                report.trials = measure.trials;
-                report.failures = measure.failures;
-                report.failure_rate =
-                    (measure.trials > 0).then(|| measure.failures as f64 / measure.trials as f64);
-                report.worst = Some(measure.worst).filter(|x| x.is_finite());
-                report.limit = Some(measure.limit);
-                report.unit = measure.unit;
-                report.why = measure.place;
+                report.trials = measure.trials();
+                report.failures = measure.failures();
+                report.failure_rate = (measure.trials() > 0)
+                    .then(|| measure.failures() as f64 / measure.trials() as f64);
+                report.worst = Some(measure.worst()).filter(|x| x.is_finite());
+                report.limit = Some(measure.limit());
+                report.unit = measure.unit();
+                report.why = measure.place().to_owned();
             }
         }
         Ok(report)

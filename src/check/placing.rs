@@ -1,13 +1,14 @@
 //! Cases 2, 5 and 10 to 15: where things are. Whole renders; the truth is another render that must
 //! be the same, the f64 reference on the same paths, or a number.
 
-use super::context::{Context, SceneText, image_bits, means, share_off};
-use super::{Case, Measure, Run};
+use super::context::Context;
+use super::{Case, Run};
 use crate::error::Result;
 use crate::film::Film;
 use crate::scene::Scene;
 use crate::scene::load::load_str;
 use crate::settings::Settings;
+use crate::verify::{Measure, SceneText, image_bits, means, share_off};
 
 pub(super) const CASES: &[Case] = &[
     Case {
@@ -68,7 +69,7 @@ pub(super) const CASES: &[Case] = &[
 /// A room of spheres of many kinds and sizes, at `place` and `scale` times as large. All numbers are
 /// short binary fractions, so that sums with powers of two are exact in f64. The reflective material
 /// is there for its weight: it depends on every bit of the directions, as no other one does.
-fn room(context: &Context, place: [f64; 3], scale: f64) -> Result<Scene> {
+fn room(place: [f64; 3], scale: f64) -> Result<Scene> {
     let at = |x: f64, y: f64, z: f64| {
         [
             place[0] + scale * x,
@@ -92,7 +93,7 @@ fn room(context: &Context, place: [f64; 3], scale: f64) -> Result<Scene> {
         .sphere(at(0.0, 0.0, 0.5), scale * 0.5, "glass")
         .sphere(at(1.0, 0.0, 0.0), scale * 0.5, "ground")
         .sphere(at(0.25, 1.5, -0.5), scale * 0.25, "lamp")
-        .load(context)
+        .load()
 }
 
 /// Adds two images that must have the same bits.
@@ -106,37 +107,34 @@ fn same(measure: &mut Measure, a: &Film, b: &Film, what: &str) {
 const OFF: f64 = 0.02;
 
 fn moved(context: &Context) -> Result<Measure> {
-    let base = room(context, [0.0; 3], 1.0)?;
+    let base = room([0.0; 3], 1.0)?;
     let settings = context.settings(&base, 24, 64);
     let film = context.render(&base, &settings)?;
     let mut measure = Measure::new(0.0, "values that differ");
     let all: &[i32] = &[4, 26, 10, 17, 23];
     for &k in context.size(&all[..2], all) {
         let d = f64::from(k).exp2();
-        let scene = room(context, [d, -d, d], context.disturbed(1.0e-4))?;
+        let scene = room([d, -d, d], context.disturbed(1.0e-4))?;
         let other = context.render(&scene, &settings)?;
         same(&mut measure, &film, &other, &format!("d = 2^{k}"));
     }
     // Sums that are not exact move the scene by some 1e-9.
     let d = 1.0e7 / 3.0;
-    let share = share_off(
-        &context.render(&room(context, [d, -d, d], 1.0)?, &settings)?,
-        &film,
-    );
+    let share = share_off(&context.render(&room([d, -d, d], 1.0)?, &settings)?, &film);
     let off = u64::from(share > OFF);
     measure.count(1, off, || format!("d = {d}: {share} of the values are off"));
     Ok(measure)
 }
 
 fn scaled(context: &Context) -> Result<Measure> {
-    let base = room(context, [0.0; 3], 1.0)?;
+    let base = room([0.0; 3], 1.0)?;
     let settings = context.settings(&base, 24, 64);
     let film = context.render(&base, &settings)?;
     let mut measure = Measure::new(0.0, "values that differ");
     let all: Vec<i32> = (-20..=20).filter(|k| *k != 0).collect();
     for k in context.size(vec![-20, 1, 20], all) {
         let scale = f64::from(k).exp2() * context.disturbed(1.0e-4);
-        let other = context.render(&room(context, [0.0; 3], scale)?, &settings)?;
+        let other = context.render(&room([0.0; 3], scale)?, &settings)?;
         same(&mut measure, &film, &other, &format!("scaled by 2^{k}"));
     }
     Ok(measure)
@@ -158,8 +156,8 @@ fn extreme(context: &Context) -> Result<Measure> {
         (1.0e-20, 1.0e-20),
         (1.0, 1.0e-20),
     ] {
-        let scene = lamp(radius, camera).load(context)?;
-        let truth = lamp(radius, camera * context.disturbed(0.3)).load(context)?;
+        let scene = lamp(radius, camera).load()?;
+        let truth = lamp(radius, camera * context.disturbed(0.3)).load()?;
         let settings = context.settings(&scene, 16, 64);
         let film = context.render(&scene, &settings)?;
         let broken = film.tally().non_finite;
@@ -182,7 +180,7 @@ fn lit(film: &Film) -> u64 {
 fn buried(context: &Context) -> Result<Measure> {
     let mut measure = Measure::new(0.0, "pixels that see it");
     let mut add = |text: SceneText, what: String| -> Result<()> {
-        let scene = text.load(context)?;
+        let scene = text.load()?;
         let film = context.render(&scene, &context.settings(&scene, 48, 256))?;
         measure.count(film.rect().pixels() as u64, lit(&film), || what);
         Ok(())
@@ -232,7 +230,7 @@ fn coincident(context: &Context) -> Result<Measure> {
                 text = text.sphere(center, radius * context.disturbed(1.0e-2), second);
             }
         }
-        text.load(context)
+        text.load()
     };
     let (once, twice) = (scene(false)?, scene(true)?);
     let settings = context.settings(&once, 24, 64);
@@ -268,7 +266,7 @@ fn shells(context: &Context) -> Result<Measure> {
                 .dielectric("inner", inner)
                 .sphere([0.1, 0.2, 0.3], 1.0, "outer")
                 .sphere([0.1, 0.2, 0.3], 1.0 - gap, "inner");
-            let scene = text.load(context)?;
+            let scene = text.load()?;
             let settings = white_settings(context, &scene);
             let film = context.render(&scene, &settings)?;
             let expected = context.disturbed(1.0e-2);
@@ -276,8 +274,8 @@ fn shells(context: &Context) -> Result<Measure> {
                 format!("gap {gap:e}, {name} inside: energy")
             });
             // The same without the environment, but a lamp: where the light goes.
-            let scene = lit_shell(context, gap, inner, 1.0)?;
-            let truth = lit_shell(context, gap, inner, context.disturbed(0.05))?;
+            let scene = lit_shell(gap, inner, 1.0)?;
+            let truth = lit_shell(gap, inner, context.disturbed(0.05))?;
             let settings = context.settings(&scene, 24, 64);
             let film = context.render(&scene, &settings)?;
             let reference = context.reference(&truth, &settings)?;
@@ -290,7 +288,7 @@ fn shells(context: &Context) -> Result<Measure> {
     Ok(measure)
 }
 
-fn lit_shell(context: &Context, gap: f64, inner: f64, emission: f64) -> Result<Scene> {
+fn lit_shell(gap: f64, inner: f64, emission: f64) -> Result<Scene> {
     SceneText::new([0.0, 0.0, 4.0], [0.0; 3])
         .diffuse("lamp", 0.5, emission)
         .dielectric("outer", 1.5)
@@ -298,7 +296,7 @@ fn lit_shell(context: &Context, gap: f64, inner: f64, emission: f64) -> Result<S
         .sphere([0.0; 3], 1.0, "outer")
         .sphere([0.0; 3], 1.0 - gap, "inner")
         .sphere([0.0, 2.0, -4.0], 3.0, "lamp")
-        .load(context)
+        .load()
 }
 
 fn mean_of(film: &Film) -> f64 {
@@ -328,7 +326,7 @@ fn nested(context: &Context) -> Result<Measure> {
     };
     let views = [[0.0, 0.0, 4.0], [0.0, 0.1, 0.3], [-0.3, 0.05, 0.0]];
     for (view, media) in views.into_iter().zip([1.0, 4.0, 2.25]) {
-        let scene = balls(SceneText::new(view, [0.0, 0.0, -9.0])).load(context)?;
+        let scene = balls(SceneText::new(view, [0.0, 0.0, -9.0])).load()?;
         let film = context.render(&scene, &white_settings(context, &scene))?;
         // Radiance in glass is larger by the index squared.
         measure.add(deviation(&film, media * context.disturbed(0.01)), || {
@@ -348,7 +346,7 @@ fn nested(context: &Context) -> Result<Measure> {
         } else {
             text
         };
-        text.load(context)
+        text.load()
     };
     let (with, without) = (plain(true)?, plain(false)?);
     let settings = context.settings(&with, 24, context.size(1024, 8192));

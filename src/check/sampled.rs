@@ -5,14 +5,13 @@ use std::f64::consts::PI;
 use glam::DVec3;
 
 use super::Measure;
-use super::context::{Context, SceneText};
-use super::inputs::Random;
-use super::intersection::ULP;
+use super::context::Context;
 use crate::error::Result;
 use crate::reference::light::aim::{Aim, aim_center, aim_pole, cone_height};
 use crate::reference::light::projected::{Cap, cap_seen};
 use crate::settings::{Integrator, LightSampling, Settings};
 use crate::statistics::{mean_and_error, normal_limit};
+use crate::verify::{Random, SceneText, ULP};
 
 type Row = [f32; 4];
 
@@ -264,7 +263,7 @@ fn limbs(context: &Context, scale: f64, how: LightSampling, measure: &mut Measur
             .diffuse("lamp", 0.0, 1.0)
             .sphere(at([0.0, -1000.0, 0.0]), 1000.0 * scale, "floor")
             .sphere(at([0.0, height, 0.0]), radius * scale, "lamp")
-            .load(context)?;
+            .load()?;
         let settings = Settings {
             integrator: Integrator::Nee,
             light_sampling: how,
@@ -298,7 +297,7 @@ fn hollow(context: &Context, scale: f64, how: LightSampling, measure: &mut Measu
         .diffuse("lamp", lamp, 1.0)
         .sphere(at([0.0; 3]), 2.0 * scale, "wall")
         .sphere(at([0.0; 3]), 0.5 * scale, "lamp")
-        .load(context)?;
+        .load()?;
     for integrator in [Integrator::Path, Integrator::Nee] {
         let settings = Settings {
             integrator,

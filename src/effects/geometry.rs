@@ -1,5 +1,6 @@
 //! Effects of where spheres, paths and the camera are.
 
+use super::surfaces::forms_that;
 use super::{Effect, Row, when};
 use crate::placement::Side;
 use crate::settings::{GeometryChoice, Offset};
@@ -14,13 +15,24 @@ pub const BAKED_MOST: usize = 256;
 pub(super) fn rows() -> Vec<Row> {
     vec![
         form(true).excludes([Effect::List]),
-        form(false).marks(["FIRST_CENTERED", "Attributes", "spheres"]),
+        form(false).marks([
+            "FIRST_CENTERED",
+            "SPHERE_COUNT",
+            "Attributes",
+            "Sphere",
+            "spheres",
+            "attributes",
+            "geometry::materials",
+            "nearer",
+            "nearer_sphere",
+        ]),
         Row::new(
             Effect::Pole,
             "pole",
             "frames at the poles of spheres much larger than what is near them",
             |asked| asked.placed(|s| s.pole.map(|_| "")),
         )
+        .needs(forms_that(|_| true))
         .marks([
             "pole",
             "pole_quadratic",
@@ -28,6 +40,7 @@ pub(super) fn rows() -> Vec<Row> {
             "Pole",
             "poles",
             "POLE_COUNT",
+            "Light::curvature",
         ]),
         Row::new(
             Effect::Interior,
@@ -42,12 +55,14 @@ pub(super) fn rows() -> Vec<Row> {
                 })
             },
         )
+        .needs(forms_that(|_| true))
         .marks([
             "root_interior",
             "root_from",
             "inside",
             "INSIDE",
             "is_inside",
+            "side",
         ]),
         Row::new(
             Effect::Straddle,
@@ -75,6 +90,7 @@ pub(super) fn rows() -> Vec<Row> {
             |asked| asked.placed(|s| s.container.map(|_| ", which lies just within a dielectric")),
         )
         .needs([Effect::Interior])
+        .needs(forms_that(|form| form.transmits))
         .excludes([Effect::Nudge, Effect::Ulp])
         .marks([
             "nested_reach",

@@ -1,5 +1,6 @@
 //! Effects of where light comes from and how it is looked for.
 
+use super::surfaces::forms_that;
 use super::{Asked, Effect, Row, when};
 use crate::placement::lights::MOST_WEIGHED;
 use crate::settings::{Integrator, LightSampling};
@@ -12,6 +13,7 @@ pub(super) fn rows() -> Vec<Row> {
             "surfaces that emit",
             |asked| asked.surfaces(|m| m.emission.max_element() > 0.0),
         )
+        .needs(forms_that(|_| true))
         .marks(["emission", "receive_emission"]),
         Row::new(
             Effect::Environment,
@@ -27,7 +29,7 @@ pub(super) fn rows() -> Vec<Row> {
                 _ => vec![],
             },
         )
-        .marks(["environment_radiance", "ENVIRONMENT"]),
+        .marks(["light::environment", "ENVIRONMENT"]),
         Row::new(
             Effect::Lights,
             "lights",
@@ -44,11 +46,18 @@ pub(super) fn rows() -> Vec<Row> {
         .needs([Effect::Projected, Effect::Table])
         .excludes([Effect::Lecture])
         .marks([
-            "direct_light",
+            "lights",
+            "light::aim",
+            "light::light",
+            "light::direct",
+            "Path::departure",
+            "share_of_hit",
+            "share_of_light",
+            "receive_direct",
             "light_weight",
-            "Aim",
-            "LightSample",
-            "departure",
+            "lighting",
+            "LIGHT_COUNT",
+            "is_delta",
         ]),
         Row::new(
             Effect::Projected,
@@ -62,7 +71,7 @@ pub(super) fn rows() -> Vec<Row> {
             },
         )
         .needs([Effect::Lights])
-        .marks(["cap_seen", "sample_cap", "Cap"]),
+        .marks(["light::projected", "weigh_lights"]),
         Row::new(
             Effect::Table,
             "table",
@@ -83,7 +92,7 @@ pub(super) fn rows() -> Vec<Row> {
             },
         )
         .needs([Effect::Lights])
-        .marks(["light_from_table"]),
+        .marks(["light_from_table", "cone_height"]),
         Row::new(
             Effect::Mis,
             "mis",

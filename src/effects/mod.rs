@@ -76,6 +76,9 @@ pub enum Effect {
     Roulette,
 }
 
+/// What asks for an effect.
+pub type Why = Box<dyn Fn(&Asked<'_>) -> Vec<String> + Send + Sync>;
+
 /// What the table says of an effect.
 pub struct Row {
     /// The effect.
@@ -85,13 +88,14 @@ pub struct Row {
     /// What it adds, in a few words.
     pub what: &'static str,
     /// The first objects or options that ask for it; empty if nothing does.
-    pub why: Box<dyn Fn(&Asked<'_>) -> Vec<String> + Send + Sync>,
+    pub why: Why,
     /// Of each of these lists one at least is in use where the effect is.
     pub needs: Vec<Vec<Effect>>,
     /// None of these is in use where the effect is.
     pub excludes: Vec<Effect>,
-    /// Names in the kernel that are the effect's own: of modules, functions, types, members and bindings.
-    /// The kernel has some of them if the effect is in use, and else none.
+    /// Names in the kernel that are the effect's own: of functions, types, members, bindings and whatever else
+    /// is declared, or parts of them, as [`is_marked`](Self::is_marked) has it. The kernel has some of them if
+    /// the effect is in use, and else none.
     pub marks: Vec<String>,
 }
 
@@ -126,6 +130,17 @@ impl Row {
     fn marks<S: Into<String>>(mut self, names: impl IntoIterator<Item = S>) -> Self {
         self.marks.extend(names.into_iter().map(Into::into));
         self
+    }
+}
+
+impl Row {
+    /// Whether a name that a kernel declares, with its modules, is one of the effect's own: a mark is the name, a
+    /// type whose member it is, a module that it is in, or a few of these with `::`.
+    #[must_use]
+    pub fn is_marked(&self, name: &str) -> bool {
+        let name = format!("::{name}::");
+        let mut marks = self.marks.iter();
+        marks.any(|mark| name.contains(&format!("::{mark}::")))
     }
 }
 

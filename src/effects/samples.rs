@@ -15,14 +15,30 @@ pub(super) fn rows() -> Vec<Row> {
                 when(sobol, || "sampler sobol".into())
             },
         )
-        .marks(["sobol4", "sobol_point", "owen_scramble", "batch"]),
+        .marks([
+            "sobol4",
+            "sobol_point",
+            "owen_scramble",
+            "shuffled",
+            "digit_mask",
+            "Stream::place",
+            "Stream::last",
+            "Partial::batch",
+        ]),
         Row::new(
             Effect::Classes,
             "classes",
             "light by the kind of its path",
             move |asked| aov(asked.settings.classes),
         )
-        .marks(["next_class", "light_class", "classes"]),
+        .marks([
+            "path::class",
+            "light_class",
+            "classes",
+            "receive_over",
+            "Path::light",
+            "Direct::event",
+        ]),
         Row::new(
             Effect::Features,
             "features",
@@ -31,10 +47,12 @@ pub(super) fn rows() -> Vec<Row> {
         )
         .marks([
             "Seen",
-            "seen",
+            "Path::seen",
+            "see",
             "features_seen",
             "features_normal",
             "features_albedo",
+            "features_depth",
         ]),
         Row::new(
             Effect::Adaptive,

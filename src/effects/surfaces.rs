@@ -1,25 +1,29 @@
 //! Effects of what surfaces are made of.
 
 use super::{Effect, Row};
-use crate::materials::forms;
+use crate::materials::{Form, forms};
+
+/// The forms of materials that are `wanted`.
+pub(super) fn forms_that(wanted: impl Fn(&Form) -> bool) -> Vec<Effect> {
+    (0..)
+        .zip(forms())
+        .filter(|(_, form)| wanted(form))
+        .map(|(code, _)| Effect::Form(code))
+        .collect()
+}
 
 pub(super) fn rows() -> Vec<Row> {
     let materials = (0..).zip(forms()).map(|(code, form)| {
         let row = Row::new(Effect::Form(code), form.name, form.what, move |asked| {
             asked.surfaces(|material| material.kind.form() == *form)
         })
-        .marks([format!("sample_{}", form.name)]);
+        .marks(["sample", "evaluate"].map(|what| format!("{what}_{}", form.name)));
         if form.transmits {
             row.needs([Effect::Interior])
         } else {
             row
         }
     });
-    let transmitting: Vec<Effect> = (0..)
-        .zip(forms())
-        .filter(|(_, form)| form.transmits)
-        .map(|(code, _)| Effect::Form(code))
-        .collect();
     let priority = Row::new(
         Effect::Priority,
         "priority",
@@ -30,7 +34,15 @@ pub(super) fn rows() -> Vec<Row> {
             })
         },
     )
-    .needs(transmitting)
-    .marks(["LEVELS", "INITIAL_MEDIA", "INITIAL_IOR", "INITIAL_SPHERES"]);
+    .needs(forms_that(|form| form.transmits))
+    .marks([
+        "LEVELS",
+        "INITIAL_MEDIA",
+        "INITIAL_IOR",
+        "INITIAL_SPHERES",
+        "Media::ior",
+        "Media::sphere",
+        "Attributes::level",
+    ]);
     materials.chain([priority]).collect()
 }

@@ -301,7 +301,7 @@ impl Film {
 mod tests {
     use super::super::{BLOCK, PixelSums};
     use super::*;
-    use crate::check::Random;
+    use crate::verify::Random;
 
     /// Of pixels whose light is 1 and once in 64 samples 17: the relative variance that 64 samples say
     /// that they have, over what it is: plainly, and by the jackknife.

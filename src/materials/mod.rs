@@ -156,7 +156,8 @@ impl MaterialKind {
     /// The name of its type in a scene file.
     #[must_use]
     pub fn name(&self) -> &'static str {
-        self.form().material
+        let form = self.form();
+        form.material
     }
 
     /// Whether paths cross the surface, so that there is a medium on its inner side.

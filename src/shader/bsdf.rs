@@ -11,7 +11,8 @@ use crate::materials::{Form, Member, MemberKind};
 ///
 /// Every member is where its type alone puts it: naga writes GLSL without offsets, and drops `@align`
 /// (gfx-rs/wgpu issue 4374).
-pub(crate) fn members(effects: &Effects) -> Vec<Member> {
+#[must_use]
+pub fn members(effects: &Effects) -> Vec<Member> {
     let mut own: Vec<Member> = Vec::new();
     if effects.has(Effect::Emission) {
         own.push(Member::vector("emission"));

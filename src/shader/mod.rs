@@ -5,12 +5,14 @@
 mod baked;
 mod binding;
 mod bsdf;
+mod names;
 mod sources;
 pub mod steps;
 
-pub(crate) use bsdf::members as material_members;
+pub use bsdf::members as material_members;
+pub use names::declared_names;
 
-use wesl::{ManglerKind, ModulePath, VirtualResolver, Wesl};
+use wesl::{CompileOptions, ManglerKind, ModulePath, VirtualResolver, Wesl};
 
 use crate::effects::{Effect, Effects, Role};
 use crate::error::{Error, Result};
@@ -102,7 +104,14 @@ pub fn link(
     for (path, text) in sources::ALL {
         resolver.add_module(module_path(path), (*text).into());
     }
+    // Of those in use only: nothing can ask for another one.
     for material in materials::ALL {
+        if !effects
+            .forms()
+            .any(|(_, form)| material.forms.contains(form))
+        {
+            continue;
+        }
         let path = format!("materials/{}", material.module);
         resolver.add_module(module_path(&path), material.wesl.into());
     }
@@ -123,9 +132,17 @@ pub fn link(
     }
     let mut compiler = Wesl::new_barebones().set_custom_resolver(resolver);
     compiler
-        .use_imports(true)
-        .use_condcomp(true)
-        .use_stripping(true)
+        .set_options(CompileOptions {
+            imports: true,
+            condcomp: true,
+            generics: false,
+            // What no entry point reaches is left out.
+            strip: true,
+            lazy: true,
+            lower: false,
+            validate: false,
+            ..CompileOptions::default()
+        })
         .set_mangler(ManglerKind::Escape)
         .set_missing_feature_behavior(wesl::Feature::Error);
     for (name, used) in effects.flags() {

@@ -9,7 +9,7 @@
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 
-use crate::check::Random;
+use crate::verify::Random;
 
 /// Resamples.
 const RESAMPLES: usize = 1000;

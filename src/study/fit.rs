@@ -173,8 +173,8 @@ fn between(pair: &[(f64, f64); 2], at: f64, inverse: bool) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::check::Random;
     use crate::study::bootstrap::Interval;
+    use crate::verify::Random;
     use statrs::distribution::{ContinuousCDF, Normal};
 
     fn powers(last: u32) -> Vec<u64> {

@@ -151,12 +151,12 @@ impl Reference {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::check::Random;
     use crate::compare::Errors;
     use crate::film::{PixelSums, Tally, Window};
     use crate::image::{Format, Picture};
     use crate::input::Encoding;
     use crate::settings::Rect;
+    use crate::verify::Random;
     use statrs::distribution::{ContinuousCDF, Normal};
     use std::collections::BTreeMap;
 

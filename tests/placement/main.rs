@@ -5,10 +5,10 @@ mod quadratic;
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
-use gpu_trace::check::Random;
 use gpu_trace::placement::{Media, Placement};
 use gpu_trace::scene::load::{load_file, load_str};
 use gpu_trace::scene::{Scene, Sphere};
+use gpu_trace::verify::Random;
 
 /// What is asked about pairs of spheres, all by index into the scene's spheres.
 #[derive(Debug, PartialEq)]

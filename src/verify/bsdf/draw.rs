@@ -1,0 +1,268 @@
+//! What is drawn from a BSDF on the device: its distribution, and what its weights are in the mean.
+
+use std::f64::consts::TAU;
+
+use glam::DVec3;
+
+use super::Subjects;
+use crate::error::Result;
+use crate::gpu::bsdf_probe::{BsdfInput, Sampled};
+use crate::materials::{Event, Surface};
+use crate::reference::core::sampling::basis_around;
+use crate::statistics::{mean_and_error, normal_p};
+use crate::verify::{Cells, Outcome, Random};
+
+/// Angles of incidence, in degrees.
+pub const ANGLES: [f64; 4] = [0.0, 45.0, 85.0, 89.9];
+
+/// Rings about the mirror direction, narrow ones for narrow lobes.
+const EDGES: [f64; 7] = [0.0, 1.0e-4, 1.0e-3, 1.0e-2, 0.1, 1.0, 2.0];
+const RINGS: usize = 5;
+const SECTORS: usize = 20;
+
+/// Samples of one direction.
+#[derive(Debug)]
+pub struct Draw<'a> {
+    subjects: &'a Subjects,
+    subject: usize,
+    surface: Surface,
+    wo: DVec3,
+    name: String,
+    samples: Vec<Sampled>,
+}
+
+/// The light that a material scatters by channel, as drawn and by quadrature.
+#[derive(Clone, Copy, Debug)]
+pub struct Energy {
+    /// Mean weights, without what refraction takes.
+    pub drawn: [f64; 3],
+    /// Their standard errors.
+    pub errors: [f64; 3],
+    /// The integrals of f cos; of delta lobes, what the twin draws.
+    pub integrals: [f64; 3],
+}
+
+impl<'a> Draw<'a> {
+    /// `count` samples of the subject at each of [`ANGLES`], from either side where it transmits.
+    ///
+    /// # Errors
+    /// If the device fails.
+    pub fn all(subjects: &'a Subjects, subject: usize, count: usize) -> Result<Vec<Self>> {
+        let kind = &subjects.kinds[subject];
+        let etas = match kind.transmits() {
+            true => vec![kind.ior(), 1.0 / kind.ior()],
+            false => vec![1.0],
+        };
+        let places = etas
+            .iter()
+            .flat_map(|eta| ANGLES.map(|angle| (*eta, angle)));
+        places
+            .map(|(eta, degrees)| Self::new(subjects, subject, eta, degrees, count))
+            .collect()
+    }
+
+    fn new(
+        subjects: &'a Subjects,
+        subject: usize,
+        eta: f64,
+        degrees: f64,
+        count: usize,
+    ) -> Result<Self> {
+        let kind = &subjects.kinds[subject];
+        // A tilted frame, so that no axis is special, rounded as the device has it.
+        let normal = DVec3::new(2.0, -1.0, 2.0) / 3.0;
+        let (sin, cos) = f64::to_radians(degrees).sin_cos();
+        let wo = cos * normal - sin * basis_around(normal).tangent;
+        let input = BsdfInput::new(subject, &Surface { normal, eta }, wo, [0.0; 4]);
+        let name = format!(
+            "case {subject}, {}, eta {eta}, {degrees} degrees",
+            kind.name()
+        );
+        let mut random = Random::new(&format!("draw {name}"));
+        let inputs: Vec<BsdfInput> = (0..count)
+            .map(|_| BsdfInput {
+                u: random.unit4(),
+                ..input
+            })
+            .collect();
+        Ok(Self {
+            subjects,
+            subject,
+            surface: input.surface(),
+            wo: input.wo(),
+            name,
+            samples: subjects.sample(&inputs)?,
+        })
+    }
+
+    /// What was drawn.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// The samples.
+    #[must_use]
+    pub fn samples(&self) -> &[Sampled] {
+        &self.samples
+    }
+
+    /// The cosine of the angle of incidence.
+    #[must_use]
+    pub fn cosine(&self) -> f64 {
+        self.surface.normal.dot(self.wo).clamp(0.0, 1.0)
+    }
+
+    /// See [`Surface::eta`].
+    #[must_use]
+    pub fn eta(&self) -> f64 {
+        self.surface.eta
+    }
+
+    fn cells(&self) -> Cells {
+        let mirrored = (-self.wo).reflect(self.surface.normal);
+        Cells::new(mirrored, &EDGES, RINGS, SECTORS)
+    }
+
+    /// Whether the samples follow the twin: directions its pdf, by chi-square over cells, and of delta lobes
+    /// each event its share. `wrong` turns the twin's normal and makes its eta larger, for companions.
+    #[must_use]
+    pub fn follows(&self, wrong: f64) -> Outcome {
+        let p = if self.subjects.kinds[self.subject].is_delta() {
+            self.choices(wrong)
+        } else {
+            self.directions(wrong)
+        };
+        (self.name.clone(), p)
+    }
+
+    fn wrong_surface(&self, wrong: f64) -> Surface {
+        let Surface { normal, eta } = self.surface;
+        let across = wrong * basis_around(normal).bitangent;
+        Surface {
+            normal: (normal + across).normalize(),
+            eta: eta * (1.0 + wrong),
+        }
+    }
+
+    fn directions(&self, wrong: f64) -> f64 {
+        let kind = &self.subjects.kinds[self.subject];
+        let uniform = self.subjects.is_uniform(self.subject);
+        let below = |surface: &Surface, w: DVec3| !kind.transmits() && w.dot(surface.normal) <= 0.0;
+        let surface = self.wrong_surface(wrong);
+        let directions = self.samples.iter().map(|s| {
+            let lost = kind.transmits() && s.weight().max_element() == 0.0;
+            (!lost && !below(&self.surface, s.wi())).then(|| s.wi())
+        });
+        self.cells().test(directions, |w| match uniform {
+            _ if below(&surface, w) => 0.0,
+            true => 1.0 / TAU,
+            false => kind.evaluate(&surface, self.wo, w).pdf,
+        })
+    }
+
+    /// p-value of how often each event is chosen, the least of all events.
+    fn choices(&self, wrong: f64) -> f64 {
+        const STEPS: u32 = 1 << 16;
+        let kind = &self.subjects.kinds[self.subject];
+        let surface = self.wrong_surface(wrong);
+        let mut random = Random::new(&self.name);
+        let mut shares = std::collections::BTreeMap::new();
+        for i in 0..STEPS {
+            let [x, y, _, w] = random.unit4().map(f64::from);
+            let z = (f64::from(i) + 0.5) / f64::from(STEPS);
+            let event = kind.sample(&surface, self.wo, [x, y, z, w]).event;
+            *shares.entry(event.bits()).or_insert(0.0) += 1.0 / f64::from(STEPS);
+        }
+        let total = self.samples.len() as f64;
+        let unknown = self.samples.iter().any(|s| !shares.contains_key(&s.event));
+        let p = |(event, share): (&u32, &f64)| {
+            let count = self.samples.iter().filter(|s| s.event == *event).count() as f64;
+            if *share > 1.0 - 0.5 / f64::from(STEPS) {
+                f64::from(u8::from(count == total))
+            } else {
+                normal_p((count - total * share) / (total * share * (1.0 - share)).sqrt())
+            }
+        };
+        if unknown {
+            0.0
+        } else {
+            shares.iter().map(p).fold(1.0, f64::min)
+        }
+    }
+
+    /// The light that is scattered.
+    #[must_use]
+    pub fn energy(&self) -> Energy {
+        let weighed = |channel: usize| -> Vec<f64> {
+            let of = |s: &Sampled| s.weight()[channel] * compression(s.event, s.eta.into());
+            self.samples.iter().map(of).collect()
+        };
+        let drawn = [0, 1, 2].map(|channel| mean_and_error(&weighed(channel)));
+        let kind = &self.subjects.kinds[self.subject];
+        let integrals = if kind.is_delta() {
+            self.twins_moment(1)
+        } else {
+            let cells = self.cells();
+            let f = |w| kind.evaluate(&self.surface, self.wo, w).f_cos.to_array();
+            total(&cells.integrals(f, 1.0e-7))
+        };
+        Energy {
+            drawn: drawn.map(|(mean, _)| mean),
+            errors: drawn.map(|(_, error)| error),
+            integrals,
+        }
+    }
+
+    /// The mean of the k-th powers of the twin's weights, without what refraction takes.
+    fn twins_moment(&self, k: i32) -> [f64; 3] {
+        let kind = &self.subjects.kinds[self.subject];
+        let mut random = Random::new(&self.name);
+        let mut sum = DVec3::ZERO;
+        for _ in 0..self.samples.len() {
+            let s = kind.sample(&self.surface, self.wo, random.unit4().map(f64::from));
+            let weight = s.weight * compression(s.event.bits(), s.eta);
+            sum += DVec3::from(weight.to_array().map(|w| w.powi(k)));
+        }
+        (sum / self.samples.len() as f64).to_array()
+    }
+
+    /// The k-th moments, for k from 1 to 4, of the weights of the lecture's uniform sampling or of a delta
+    /// lobe, by channel, each over the bound that the material says. 0 where the bound is.
+    #[must_use]
+    pub fn moments(&self) -> [[f64; 3]; 4] {
+        let kind = &self.subjects.kinds[self.subject];
+        let bound = |k: usize, channel: usize| kind.moment(channel, k as i32 + 1);
+        let over = |moment: f64, bound: f64| if moment == 0.0 { 0.0 } else { moment / bound };
+        if kind.is_delta() {
+            return std::array::from_fn(|k| {
+                let moment = self.twins_moment(k as i32 + 1);
+                std::array::from_fn(|c| over(moment[c], bound(k, c)))
+            });
+        }
+        let bounds: [f64; 12] = std::array::from_fn(|i| bound(i / 3, i % 3));
+        let f = |w| -> [f64; 12] {
+            let f_cos = kind.evaluate(&self.surface, self.wo, w).f_cos;
+            let above = kind.transmits() || w.dot(self.surface.normal) > 0.0;
+            std::array::from_fn(|i| {
+                let weight = if above { TAU * f_cos[i % 3] } else { 0.0 };
+                over(weight.powi(i as i32 / 3 + 1) / TAU, bounds[i])
+            })
+        };
+        let all = total(&self.cells().integrals(f, 1.0e-7));
+        std::array::from_fn(|k| std::array::from_fn(|c| all[3 * k + c]))
+    }
+}
+
+/// What refraction takes out of a weight.
+fn compression(event: u32, eta: f64) -> f64 {
+    if event & Event::TRANSMITTED.bits() == 0 {
+        1.0
+    } else {
+        eta * eta
+    }
+}
+
+fn total<const N: usize>(cells: &[[f64; N]]) -> [f64; N] {
+    std::array::from_fn(|i| cells.iter().map(|cell| cell[i]).sum())
+}

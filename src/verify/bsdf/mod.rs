@@ -1,0 +1,207 @@
+//! What every material has to pass, whatever it is: [`crate::materials::ALL`] and their test cases, on a
+//! device through the dispatch, with the records that a render has.
+//!
+//! [`twin`]: the device says what the f64 twin says. [`draw`]: what is drawn follows the pdf, and its mean
+//! weight is the light that is scattered. [`pairs`]: sample and evaluate agree, and so do both ways.
+
+pub mod draw;
+pub mod pairs;
+pub mod twin;
+
+use glam::DVec3;
+
+use crate::error::Result;
+use crate::gpu::bsdf_probe::{BsdfInput, BsdfProbe, Evaluated, Sampled};
+use crate::gpu::device::Gpu;
+use crate::materials::{ALL, BsdfSample, BsdfValue, MaterialKind, Surface, sample_uniform};
+use crate::settings::Integrator;
+use crate::verify::{Random, ULP};
+
+/// Materials on a device, and their twins.
+#[derive(Debug)]
+pub struct Subjects {
+    kinds: Vec<MaterialKind>,
+    lecture: bool,
+    probe: BsdfProbe,
+}
+
+impl Subjects {
+    /// All cases of all materials.
+    ///
+    /// # Errors
+    /// If the device fails.
+    pub fn all(gpu: &Gpu, integrator: Integrator) -> Result<Self> {
+        let kinds = ALL.iter().flat_map(|material| (material.cases)());
+        Self::of(gpu, kinds.collect(), integrator)
+    }
+
+    /// These.
+    ///
+    /// # Errors
+    /// If the device fails.
+    pub fn of(gpu: &Gpu, kinds: Vec<MaterialKind>, integrator: Integrator) -> Result<Self> {
+        Ok(Self {
+            probe: BsdfProbe::new(gpu, &kinds, integrator)?,
+            lecture: matches!(integrator, Integrator::Lecture { .. }),
+            kinds,
+        })
+    }
+
+    /// The materials; a question names one by its place.
+    #[must_use]
+    pub fn kinds(&self) -> &[MaterialKind] {
+        &self.kinds
+    }
+
+    /// Whether they are sampled uniformly, but for delta lobes.
+    #[must_use]
+    pub fn is_uniform(&self, subject: usize) -> bool {
+        self.lecture && !self.kinds[subject].is_delta()
+    }
+
+    /// What the device makes of uniform numbers.
+    ///
+    /// # Errors
+    /// If the device fails.
+    pub fn sample(&self, inputs: &[BsdfInput]) -> Result<Vec<Sampled>> {
+        self.probe.sample(inputs)
+    }
+
+    /// What the device says of directions.
+    ///
+    /// # Errors
+    /// If the device fails.
+    pub fn evaluate(&self, inputs: &[BsdfInput]) -> Result<Vec<Evaluated>> {
+        self.probe.evaluate(inputs)
+    }
+
+    /// The next case of the same type of material: one that it must not be taken for.
+    fn next(&self, subject: usize) -> usize {
+        let name = self.kinds[subject].name();
+        let after = (subject + 1..self.kinds.len()).find(|i| self.kinds[*i].name() == name);
+        let first = self.kinds.iter().position(|kind| kind.name() == name);
+        after.or(first).unwrap_or(subject)
+    }
+
+    fn twin_sample(&self, subject: usize, q: &Question) -> BsdfSample {
+        let kind = &self.kinds[subject];
+        if self.is_uniform(subject) {
+            sample_uniform(&**kind, &q.surface, q.wo, q.u)
+        } else {
+            kind.sample(&q.surface, q.wo, q.u)
+        }
+    }
+
+    fn twin_evaluate(&self, subject: usize, q: &Question) -> BsdfValue {
+        self.kinds[subject].evaluate(&q.surface, q.wo, DVec3::new(q.u[0], q.u[1], q.u[2]))
+    }
+
+    /// Questions to `subject`; their last row is uniform numbers.
+    fn questions(&self, random: &mut Random, subject: usize, count: usize) -> Vec<BsdfInput> {
+        let kind = &self.kinds[subject];
+        (0..count)
+            .map(|i| {
+                let normal = normal(random, i);
+                let wo = arrival(random, normal, i);
+                let eta = eta(random, kind, i);
+                BsdfInput::new(subject, &Surface { normal, eta }, wo, random.unit4())
+            })
+            .collect()
+    }
+
+    /// The same with a direction as the last row, half of them near the mirror direction.
+    fn directions(&self, random: &mut Random, subject: usize, count: usize) -> Vec<BsdfInput> {
+        let mut inputs = self.questions(random, subject, count);
+        for (i, input) in inputs.iter_mut().enumerate() {
+            let near = (-input.wo()).reflect(input.surface().normal);
+            let wi = match i % 2 {
+                0 => near + random.magnitude(-3.0, 0.5) * random.direction(),
+                _ => random.direction(),
+            };
+            input.u = super::to_row(wi.normalize(), 0.0);
+        }
+        inputs
+    }
+}
+
+/// A question as the twin takes it: the numbers of a [`BsdfInput`].
+#[derive(Clone, Copy, Debug)]
+struct Question {
+    surface: Surface,
+    wo: DVec3,
+    u: [f64; 4],
+}
+
+impl Question {
+    fn of(input: &BsdfInput) -> Self {
+        Self {
+            surface: input.surface(),
+            wo: input.wo(),
+            u: input.u.map(f64::from),
+        }
+    }
+
+    /// All numbers off by up to [`INPUTS`].
+    fn perturbed(&self, random: &mut Random) -> Self {
+        let mut off = || {
+            let [x, y, z, w] = random.unit4().map(|x| (2.0 * f64::from(x) - 1.0) * INPUTS);
+            (DVec3::new(x, y, z), w)
+        };
+        let ((normal, eta), (wo, w), (u, _)) = (off(), off(), off());
+        Self {
+            surface: Surface {
+                normal: self.surface.normal + normal,
+                eta: self.surface.eta * (1.0 + eta),
+            },
+            wo: self.wo + wo,
+            u: [
+                self.u[0] + u.x,
+                self.u[1] + u.y,
+                self.u[2] + u.z,
+                self.u[3] + w,
+            ],
+        }
+    }
+}
+
+/// What arithmetic in f32 makes of a formula is what the formula makes of inputs that are slightly off: by so
+/// much, for some 16 operations one after another. What that does is found from [`PERTURBED`] random ones;
+/// besides, there are the roundings of the last steps and of the parameters, [`ROUNDINGS`].
+const INPUTS: f64 = 16.0 * ULP;
+const PERTURBED: usize = 8;
+const ROUNDINGS: f64 = 16.0 * ULP;
+
+/// Where the allowance is beyond this share of the value, a case says nothing: an edge of a lobe, or the
+/// border of total reflection.
+const EDGE: f64 = 1.0e-2;
+
+fn normal(random: &mut Random, i: usize) -> DVec3 {
+    const SPECIAL: [DVec3; 4] = [DVec3::Z, DVec3::NEG_Z, DVec3::X, DVec3::NEG_Y];
+    match i % 16 {
+        0 => SPECIAL[i / 16 % SPECIAL.len()],
+        _ => random.direction(),
+    }
+}
+
+/// A direction on the normal's side; along it and grazing ones among them.
+fn arrival(random: &mut Random, normal: DVec3, i: usize) -> DVec3 {
+    let wo = random.direction();
+    let wo = if wo.dot(normal) < 0.0 { -wo } else { wo };
+    let cosine = match i % 8 {
+        1 => random.magnitude(-4.0, -1.0),
+        2 => return normal,
+        _ => wo.dot(normal).max(1.0e-4),
+    };
+    (wo + (cosine - wo.dot(normal)) * normal).normalize()
+}
+
+fn eta(random: &mut Random, kind: &MaterialKind, i: usize) -> f64 {
+    let choices = if kind.transmits() {
+        let ior = kind.ior();
+        [ior, 1.0 / ior, 1.0, random.range(0.4, 2.5)]
+    } else {
+        // In air, or in glass.
+        [1.0, 1.0, 1.0 / 1.5, 1.0 / random.range(1.0, 2.5)]
+    };
+    choices[i / 3 % 4]
+}
