@@ -217,7 +217,7 @@ fn check_magnitudes(placement: &Placement) -> Result<()> {
     {
         return refuse("the distance of --offset");
     }
-    if !placement.light.is_finite() {
+    if !placement.radiance_scale.is_finite() {
         return Err(Error::Placement(
             "the brightest light of the scene is too dark to compute with".into(),
         ));

@@ -225,7 +225,7 @@ fn a_closed_room_has_no_sky() {
         let scene = spheres(camera, &[([0.0; 3], 1.0, "lamp")]);
         let placement = Placement::new(&scene, 16, 16);
         let effects = Effects::derive(&scene, &placement, &Settings::for_scene(&scene));
-        (effects.has(Effect::Environment), placement.light)
+        (effects.has(Effect::Environment), placement.radiance_scale)
     };
     assert!(!effects([0.0, 0.0, 0.5]).0);
     assert!(effects([0.0, 0.0, 4.0]).0);
@@ -233,7 +233,7 @@ fn a_closed_room_has_no_sky() {
     let mut scene = spheres([0.0, 0.0, 0.5], &[([0.0; 3], 1.0, "lamp")]);
     scene.environment = Some(glam::DVec3::splat(1.0e20));
     assert_eq!(
-        Placement::new(&scene, 16, 16).light,
+        Placement::new(&scene, 16, 16).radiance_scale,
         effects([0.0, 0.0, 0.5]).1
     );
 }

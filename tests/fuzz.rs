@@ -714,8 +714,12 @@ fn assert_finite(placement: &Placement) {
     let vector = |name: &str, x: DVec3| assert!(x.is_finite(), "{name} is {x}");
     number("scale", placement.scale);
     assert!(placement.scale > 0.0, "scale is {}", placement.scale);
-    number("light", placement.light);
-    assert!(placement.light > 0.0, "light is {}", placement.light);
+    number("light", placement.radiance_scale);
+    assert!(
+        placement.radiance_scale > 0.0,
+        "light is {}",
+        placement.radiance_scale
+    );
     for sphere in &placement.spheres {
         vector("anchor", sphere.anchor);
         number("radius", sphere.radius);

@@ -93,7 +93,7 @@ pub(super) fn rows() -> Vec<Row> {
         .needs(forms_that(|form| form.transmits))
         .excludes([Effect::Nudge, Effect::Ulp])
         .marks([
-            "nested_reach",
+            "can_be_hit",
             "container",
             "core0",
             "core1",

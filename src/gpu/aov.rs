@@ -12,7 +12,7 @@ pub(super) struct AovLayout {
     classes: Option<usize>,
     features: Option<usize>,
     /// Kernel radiance per radiance.
-    light: f64,
+    radiance_scale: f64,
     /// Kernel lengths per scene length.
     scale: f64,
     /// Depth at which rays start, in kernel lengths.
@@ -31,7 +31,7 @@ impl AovLayout {
             stride: stride as usize,
             classes: offset("classes"),
             features: offset("features_normal"),
-            light: placement.light,
+            radiance_scale: placement.radiance_scale,
             scale: placement.scale,
             approach: placement.camera.approach,
         };
@@ -54,7 +54,7 @@ impl AovLayout {
         let mut sums = AovSums::default();
         if let Some(at) = self.classes {
             for (i, class) in sums.classes.iter_mut().enumerate() {
-                *class = vector(at + 16 * i).map(|x| x / self.light);
+                *class = vector(at + 16 * i).map(|x| x / self.radiance_scale);
             }
         }
         // Two vectors, each followed by a number.

@@ -70,7 +70,7 @@ pub(crate) fn light_weight(index: usize, placement: &Placement, effects: &Effect
         .of_sphere(index)
         .map_or(0.0, |light| match effects.has(Effect::Table) {
             true => light.probability,
-            false => light.luminance * placement.light,
+            false => light.luminance * placement.radiance_scale,
         })
 }
 

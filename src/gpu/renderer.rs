@@ -46,7 +46,7 @@ pub struct GpuRenderer {
     /// Longest side of a region.
     side: u32,
     /// Kernel radiance per radiance.
-    light: f64,
+    radiance_scale: f64,
     pace: Pace,
     /// Loop iterations after which an invocation starts no further path.
     step_limit: u32,
@@ -119,7 +119,7 @@ impl GpuRenderer {
             sampler: settings.sampler,
             aovs,
             side,
-            light: placement.light,
+            radiance_scale: placement.radiance_scale,
             pace: Pace::unknown(),
             step_limit,
         })
@@ -253,7 +253,7 @@ impl GpuRenderer {
         }
         recording.read(COUNTERS).clear(COUNTERS, 0);
         let readings = self.engine.run(recording)?;
-        let (pixels, mut tally) = region::sums(&readings, region, chosen, self.light);
+        let (pixels, mut tally) = region::sums(&readings, region, chosen, self.radiance_scale);
         let counters = bytemuck::from_bytes(readings[COUNTERS].bytes());
         region::count(&mut tally, counters, region, samples);
         let mut aovs = match &self.aovs {

@@ -35,7 +35,7 @@ pub struct Placement {
     pub scale: f64,
     /// Kernel radiance per radiance, a power of two that brings the brightest light to 2^32: sums of
     /// squares in f32 then hold light of 1e20, and beside it light a 1e-26 of that.
-    pub light: f64,
+    pub radiance_scale: f64,
     /// The spheres that paths can reach, those with a pole frame first, else in scene order.
     pub spheres: Vec<PlacedSphere>,
     /// How many of `spheres` have a pole frame.
@@ -134,7 +134,7 @@ impl Placement {
         let offset = offset.scaled(scale);
         Self {
             scale,
-            light: unit::radiance(scene, &order, enclosed),
+            radiance_scale: unit::radiance(scene, &order, enclosed),
             enclosed,
             coincident,
             lights: Lights::new(scene, &spheres, offset),

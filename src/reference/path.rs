@@ -68,7 +68,7 @@ struct Departure {
     /// With which the BSDF found the direction; 0: light sampling could not have found it.
     pdf: f64,
     /// See [`light_pdf`].
-    reach: f64,
+    pdf_per_weight: f64,
 }
 
 impl Path {
@@ -158,7 +158,7 @@ impl PathTracer<'_> {
                 .map_or(path.class, |e| next_class(path.class, e));
             path.receive(class, path.throughput * direct.radiance);
             path.found.rays += direct.rays;
-            path.departure.reach = direct.reach;
+            path.departure.pdf_per_weight = direct.pdf_per_weight;
         }
         let s = self.sample(&material.kind, &surface, wo, u);
         self.go_on(path, &hit, &vertex, &s, u[3])
@@ -195,7 +195,7 @@ impl PathTracer<'_> {
     fn go_on(&self, path: &mut Path, hit: &Hit, vertex: &Vertex, s: &BsdfSample, u: f64) -> bool {
         path.class = next_class(path.class, s.event);
         path.departure.pdf = s.pdf;
-        path.departure.reach *= vertex.normal.dot(s.wi).max(0.0);
+        path.departure.pdf_per_weight *= vertex.normal.dot(s.wi).max(0.0);
         path.throughput *= s.weight;
         path.eta_scale *= s.eta * s.eta;
         let largest = (path.throughput * path.eta_scale).max_element();
@@ -242,8 +242,9 @@ impl PathTracer<'_> {
         };
         let sphere = &self.placement.spheres[hit.index];
         let aim = aim_at(sphere, ray.anchor, ray.offset);
-        let reach = (!lights.from_table(self.settings.light_sampling)).then_some(from.reach);
-        let other = light_pdf(light, &aim, reach);
+        let pdf_per_weight =
+            (!lights.from_table(self.settings.light_sampling)).then_some(from.pdf_per_weight);
+        let other = light_pdf(light, &aim, pdf_per_weight);
         match self.settings.integrator {
             Integrator::Path => mis_weight(from.pdf, other),
             _ if other > 0.0 => 0.0,
@@ -271,7 +272,7 @@ impl PathTracer<'_> {
         let Some(s) = sample_light(self.placement, sampling, vertex, hit.index, u) else {
             return direct;
         };
-        direct.reach = s.reach;
+        direct.pdf_per_weight = s.pdf_per_weight;
         let f = kind.evaluate(surface, -ray.direction, s.wi);
         direct.event = Some(f.event);
         if s.pdf <= 0.0 || f.pdf <= 0.0 {
@@ -305,7 +306,7 @@ impl PathTracer<'_> {
 struct Direct {
     radiance: DVec3,
     rays: u32,
-    reach: f64,
+    pdf_per_weight: f64,
     event: Option<Event>,
 }
 
@@ -340,7 +341,7 @@ mod tests {
             };
             let from = Departure {
                 pdf: 0.3,
-                reach: 0.3,
+                pdf_per_weight: 0.3,
             };
             tracer.share_of_emission(&ray, &hit, from)
         };

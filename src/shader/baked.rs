@@ -97,11 +97,11 @@ fn closest_hit(text: &mut String, placement: &Placement, effects: &Effects) {
         } else {
             String::new()
         };
-        let reach = nested_reach(placement, effects, sphere);
+        let reach = can_be_hit(placement, effects, sphere);
         let closer = reach
             .as_ref()
-            .map_or("t < hit.t", |_| "t < hit.t && nested_reach");
-        let reach = reach.map_or_else(String::new, |r| format!("let nested_reach = {r};\n"));
+            .map_or("t < hit.t", |_| "t < hit.t && can_be_hit");
+        let reach = reach.map_or_else(String::new, |r| format!("let can_be_hit = {r};\n"));
         let _ = write!(
             text,
             "{{\nlet x = (ray.anchor - {}) + ray.offset;\nlet q = {quadratic};\n\
@@ -125,8 +125,8 @@ fn within(placement: &Placement, index: usize) -> String {
 }
 
 /// When a sphere can be hit that lies just within another, or has one just within it; see
-/// `nested_reach` in `shaders/scene/list.wesl`.
-fn nested_reach(placement: &Placement, effects: &Effects, sphere: &PlacedSphere) -> Option<String> {
+/// `can_be_hit` in `shaders/scene/list.wesl`.
+fn can_be_hit(placement: &Placement, effects: &Effects, sphere: &PlacedSphere) -> Option<String> {
     let container = sphere.container.map(|c| within(placement, c));
     let cores = sphere.cores.iter();
     let core = cores.map(|c| format!("!{}", within(placement, *c)));
@@ -185,7 +185,7 @@ fn material_of(text: &mut String, scene: &Scene, placement: &Placement, effects:
     let records: Vec<MaterialRecord> = placement
         .spheres
         .iter()
-        .map(|s| MaterialRecord::new(&scene.materials[s.material], placement.light))
+        .map(|s| MaterialRecord::new(&scene.materials[s.material], placement.radiance_scale))
         .collect();
     *text += "fn material_of(index: u32) -> Material {\nvar material: Material;\n";
     for member in members(effects) {

@@ -211,7 +211,7 @@ fn config(scene: &Scene, placement: &Placement, effects: &Effects) -> String {
         steps::vertex_steps(placement, effects)
     );
     if effects.has(Effect::Environment) {
-        let radiance = scene.environment.unwrap_or_default() * placement.light;
+        let radiance = scene.environment.unwrap_or_default() * placement.radiance_scale;
         text += &format!("const ENVIRONMENT: vec3f = {};\n", baked::vector(radiance));
     }
     if effects.has(Effect::Lights) {

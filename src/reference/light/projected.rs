@@ -118,8 +118,8 @@ pub fn sample_cap(cap: &Cap, normal: DVec3, u: DVec2) -> (DVec3, f64) {
         let kept = if c < 0.0 {
             let gap = (cap.horizon.y - y) * (cap.horizon.y + y);
             let q = ((s - y) * (s + y)).max(0.0).sqrt() / s;
-            let reach = sin_t / (s * (q - c * cap.horizon.x / s).max(1.0e-300));
-            reach * reach * gap * (x_r + cap.horizon.x) / (x_r + g - s * c * q)
+            let stretch = sin_t / (s * (q - c * cap.horizon.x / s).max(1.0e-300));
+            stretch * stretch * gap * (x_r + cap.horizon.x) / (x_r + g - s * c * q)
         } else {
             1.0
         };

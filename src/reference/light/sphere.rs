@@ -24,15 +24,15 @@ pub fn light_from_table(lights: &Lights, u: [f64; 2]) -> Option<&Light> {
     }
 }
 
-/// For MIS, the pdf in solid angle with which light sampling finds a direction to `light`; `reach` as
+/// For MIS, the pdf in solid angle with which light sampling finds a direction to `light`; `pdf_per_weight` as
 /// in the kernel, `None` where lights are drawn from the table.
 #[must_use]
-pub fn light_pdf(light: &Light, aim: &Aim, reach: Option<f64>) -> f64 {
+pub fn light_pdf(light: &Light, aim: &Aim, pdf_per_weight: Option<f64>) -> f64 {
     if !aim.outside {
         return 0.0;
     }
-    match reach {
-        Some(reach) => light.luminance * reach,
+    match pdf_per_weight {
+        Some(pdf_per_weight) => light.luminance * pdf_per_weight,
         None => light.probability / (TAU * cone_height(aim)),
     }
 }
@@ -61,7 +61,7 @@ pub struct LightSample {
     pub mis_pdf: f64,
     pub limb: f64,
     pub sphere: usize,
-    pub reach: f64,
+    pub pdf_per_weight: f64,
 }
 
 /// A direction to a light, for a vertex on the placement's sphere `own`; `None` if it sees none.
@@ -101,7 +101,7 @@ pub fn sample_light(
         mis_pdf: light_pdf(light, &aim, None),
         limb: limb_distance(&aim, direction),
         sphere: light.sphere,
-        reach: 0.0,
+        pdf_per_weight: 0.0,
     })
 }
 
@@ -137,16 +137,16 @@ fn weighed_light(
         }
     }
     let (light, cap, strength) = chosen?;
-    let reach = 1.0 / total;
+    let pdf_per_weight = 1.0 / total;
     let (direction, extent) = sample_cap(&cap, vertex.normal, DVec2::new(u[0], u[1]));
     let cosine = vertex.normal.dot(direction).max(0.0);
     Some(LightSample {
         wi: direction,
-        pdf: strength * reach * cosine / extent,
-        mis_pdf: light.luminance * reach * cosine,
+        pdf: strength * pdf_per_weight * cosine / extent,
+        mis_pdf: light.luminance * pdf_per_weight * cosine,
         limb: limb_distance(&cap.aim, direction),
         sphere: light.sphere,
-        reach,
+        pdf_per_weight,
     })
 }
 
