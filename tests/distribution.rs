@@ -154,12 +154,24 @@ fn samples_follow_their_pdfs() {
 fn mean_weights_are_the_light_that_is_scattered() {
     for integrator in [Integrator::Bsdf, LECTURE] {
         let found = each_draw(integrator, |draw, kind| {
-            (
-                draw.name().to_owned(),
-                draw.energy(),
-                kind.albedo().to_array(),
-            )
+            // Uniform directions meet a lobe so narrow that its second moment is that large a few times or
+            // never: no estimate.
+            let rare = integrator == LECTURE && kind.moment(0, 2) > DRAWN as f64;
+            (!rare).then(|| {
+                (
+                    draw.name().to_owned(),
+                    draw.energy(),
+                    kind.albedo().to_array(),
+                )
+            })
         });
+        let all = found.len();
+        let found: Vec<_> = found.into_iter().flatten().collect();
+        assert!(
+            2 * found.len() > all,
+            "only {} of {all} materials",
+            found.len()
+        );
         let limit = normal_limit(3 * found.len());
         let mut missed = 0;
         for (name, energy, albedo) in &found {

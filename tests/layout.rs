@@ -463,6 +463,6 @@ fn the_scenes_data_agree() {
         (expected.len(), end.next_multiple_of(16))
     );
     // Without lights, poles and spheres in a list there is nothing to read.
-    let baked = self::kernel(Stage::Path, &["baked", "bsdf", "diffuse"]);
+    let baked = self::kernel(Stage::Path, &["baked", "diffuse"]);
     assert_eq!(baked.struct_members("SceneData"), None);
 }

@@ -343,7 +343,7 @@ fn bindings_are_found_by_name() {
     ];
     assert_eq!(names, expected);
     assert_eq!(kernel.bindings("no entry point"), []);
-    let probe = common::probe(&["list", "bsdf"]);
+    let probe = common::probe(&["list"]);
     let names = |entry: &str| {
         let bindings = probe.kernel().bindings(entry);
         let mut names: Vec<String> = bindings.into_iter().map(|b| b.name).collect();

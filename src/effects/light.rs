@@ -51,6 +51,7 @@ pub(super) fn rows() -> Vec<Row> {
             "light::light",
             "light::direct",
             "Path::departure",
+            "data::Light",
             "share_of_hit",
             "share_of_light",
             "receive_direct",

@@ -36,7 +36,7 @@ pub(super) fn rows() -> Vec<Row> {
             "light_class",
             "classes",
             "receive_over",
-            "Path::light",
+            "Path::by_class",
             "Direct::event",
         ]),
         Row::new(

@@ -247,8 +247,8 @@ impl Bsdf for Conductor {
         }
         let (alpha, frame) = (self.alpha(), self.frame(surface));
         let o = above(frame.to_local(wo));
-        let h = ggx_normal(o, alpha, DVec2::new(u[0], u[1]));
-        let cos_h = o.dot(h).clamp(0.0, 1.0);
+        let (h, cos_h) = ggx_normal(o, alpha, DVec2::new(u[0], u[1]));
+        let cos_h = cos_h.min(1.0);
         let i = 2.0 * cos_h * h - o;
         let (mut weight, mut pdf) = (DVec3::ZERO, 0.0);
         // Below the horizon the path ends: it would meet another microfacet.

@@ -87,13 +87,16 @@ pub fn ggx_weight(wo: DVec3, wi: DVec3, alpha: DVec2) -> f64 {
     wi.z * (wo.z + s) / (wi.z * s + wo.z * ggx_s(wi, alpha))
 }
 
-/// A normal that wo sees.
+/// A normal that wo sees, and its cosine with wo.
 #[must_use]
-pub fn ggx_normal(wo: DVec3, alpha: DVec2, u: DVec2) -> DVec3 {
-    let stretched = (alpha * wo.truncate()).extend(wo.z).normalize();
+pub fn ggx_normal(wo: DVec3, alpha: DVec2, u: DVec2) -> (DVec3, f64) {
+    let length = ggx_s(wo, alpha);
+    let stretched = (alpha * wo.truncate()).extend(wo.z) / length;
     let z = 1.0 - (1.0 + stretched.z) * u.x;
     let sine = ((1.0 - z) * (1.0 + z)).max(0.0).sqrt();
     let (sin, cos) = (TAU * u.y).sin_cos();
     let h = DVec3::new(sine * cos, sine * sin, z) + stretched;
-    (alpha * h.truncate()).extend(h.z.max(0.0)).normalize()
+    let n = (alpha * h.truncate()).extend(h.z.max(0.0));
+    let inverse = n.length().recip();
+    (inverse * n, 0.5 * length * h.length_squared() * inverse)
 }
