@@ -379,7 +379,7 @@ fn fresnel_is_what_is_known_of_it() {
     }
     // Total reflection, beyond sin i = eta.
     let eta = 1.0 / 1.5;
-    let critical = (1.0 - eta * eta).sqrt();
+    let critical = f64::sqrt(1.0 - eta * eta);
     assert_eq!(
         reflected(&[0.999 * critical, 0.5 * critical, 1.0e-6], eta),
         [1.0; 3]
