@@ -166,7 +166,7 @@ fn a_scene_beyond_the_devices_limits_is_an_error() {
     };
     for (bytes, part) in [(64, "need"), (4096, "the partial sums need")] {
         match with_at_most(bytes) {
-            Err(Error::Gpu(text)) => {
+            Err(Error::DeviceLimit(text)) => {
                 let limit = format!("limit of {bytes} ");
                 holds(&text, &[part, "bytes", &limit, "--backend cpu"]);
             }

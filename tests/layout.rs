@@ -241,6 +241,8 @@ fn fixed_structs_agree() {
         step_limit,
         zero,
         last_of_batch,
+        step_most,
+        unused,
     });
     check("Dispatch", &dispatch, &kernel);
     let counters = host!(CountersRecord {

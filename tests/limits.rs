@@ -21,7 +21,7 @@ use gpu_trace::scene::Scene;
 use gpu_trace::settings::{GeometryChoice, Integrator, LightSampling, Rect, Settings};
 use gpu_trace::shader::steps::{LOOPS, vertex_steps};
 use gpu_trace::shader::{Kernel, Stage, link};
-use gpu_trace::verify::{means, settings};
+use gpu_trace::verify::{Random, means, settings};
 
 /// A closed furnace that keeps all light.
 const FURNACE: &str = "
@@ -111,6 +111,37 @@ fn a_path_longer_than_any_dispatch_is_an_error_or_right() {
         Ok(outcome) => assert_eq!(mean(&outcome.film), 65_536.0),
         Err(Error::Gpu(text)) => assert!(text.contains("--max-bounces"), "{text}"),
         Err(other) => panic!("{other}"),
+    }
+}
+
+/// A driver that ends the loop over spheres within a path makes it miss the wall behind them, which is the
+/// last of the list: what it saw until then is no sample.
+#[test]
+fn a_path_within_which_a_loop_ends_is_an_error_or_right() {
+    let mut random = Random::new("crowd");
+    let (head, wall) = FURNACE.split_once("[[sphere]]").expect("one sphere");
+    let mut text = head.to_owned();
+    for _ in 0..4000 {
+        let d = random.direction() * random.range(0.4, 1.6);
+        text += &format!(
+            "[[sphere]]\ncenter = [{:?}, {:?}, {:?}]\nradius = 0.004\nmaterial = \"wall\"\n",
+            d.x, d.y, d.z
+        );
+    }
+    let scene = scene(&format!("{text}[[sphere]]{wall}"));
+    let endless = Settings {
+        max_bounces: 1000,
+        integrator: Integrator::Bsdf,
+        ..settings(&scene, 2, 1, 1)
+    };
+    for seed in 1..=8 {
+        let mut renderer = gpu_renderer(&scene, &endless).with_seed(seed);
+        match render_quietly(&mut renderer, &endless) {
+            // A driver without such a limit.
+            Ok(outcome) => assert_eq!(means(&outcome.film), [1001.0; 6], "seed {seed}"),
+            Err(Error::Gpu(text)) => assert!(text.contains("--max-bounces"), "{text}"),
+            Err(other) => panic!("{other}"),
+        }
     }
 }
 

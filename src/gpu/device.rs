@@ -4,6 +4,7 @@ use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crate::error::{Error, Result};
+use crate::shader::steps::LOOP_ITERATIONS;
 
 /// What can be said about an adapter before it is opened.
 #[derive(Clone, Debug)]
@@ -332,6 +333,15 @@ impl Gpu {
             self.summary.name,
             faults.join("; ")
         )))
+    }
+
+    /// Loop iterations of an invocation up to which the driver ends no loop in silence.
+    #[must_use]
+    pub fn loop_iterations(&self) -> u32 {
+        match self.summary.name.contains("llvmpipe") {
+            true => LOOP_ITERATIONS as u32,
+            false => u32::MAX,
+        }
     }
 
     /// Waits until the queue is empty.

@@ -1,8 +1,8 @@
 //! The structs that host and kernel share, in the kernel's layout.
 //!
 //! Structs of fixed layout are `bytemuck` structs; a test compares their offsets with naga's.
-//! `Material` and `Attributes` lose the members that no effect in use needs: they are written
-//! member by member at the offsets that naga reports.
+//! `Material` and `Attributes` lose the members that no effect in use needs: the former is written member
+//! by member at the offsets that naga reports, the latter, of words alone, in their order (`gpu/data.rs`).
 
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
@@ -179,6 +179,10 @@ pub struct DispatchRecord {
     pub zero: u32,
     /// Samples of a batch minus 1, see [`crate::sampler::Sampler::batch`].
     pub last_of_batch: u32,
+    /// Loop iterations after which the driver may have ended a loop in silence.
+    pub step_most: u32,
+    /// Padding.
+    pub unused: u32,
 }
 
 /// `adaptive_tiles` of `shaders/path.wesl`: a bit for every tile of a region.

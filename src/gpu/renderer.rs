@@ -196,6 +196,7 @@ impl GpuRenderer {
             window_start: samples.start as u32,
             stream: stream_words(self.seed, (samples.start >> 32) as u32),
             step_limit: self.step_limit,
+            step_most: self.engine.gpu().loop_iterations(),
             last_of_batch: (self.sampler.batch(samples.start) - 1) as u32,
             ..DispatchRecord::zeroed()
         };

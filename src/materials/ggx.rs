@@ -92,11 +92,11 @@ pub fn ggx_weight(wo: DVec3, wi: DVec3, alpha: DVec2) -> f64 {
 pub fn ggx_normal(wo: DVec3, alpha: DVec2, u: DVec2) -> (DVec3, f64) {
     let length = ggx_s(wo, alpha);
     let stretched = (alpha * wo.truncate()).extend(wo.z) / length;
-    let z = 1.0 - (1.0 + stretched.z) * u.x;
-    let sine = ((1.0 - z) * (1.0 + z)).max(0.0).sqrt();
-    let (sin, cos) = (TAU * u.y).sin_cos();
-    let h = DVec3::new(sine * cos, sine * sin, z) + stretched;
-    let n = (alpha * h.truncate()).extend(h.z.max(0.0));
+    let whole = 1.0 + stretched.z;
+    let (below, above) = (whole * u.x, whole * (1.0 - u.x));
+    let sine2 = below * (stretched.truncate().length_squared() / whole + above);
+    let h = (sine2.sqrt() * DVec2::from_angle(TAU * u.y) + stretched.truncate()).extend(above);
+    let n = (alpha * h.truncate()).extend(h.z);
     let inverse = n.length().recip();
     (inverse * n, 0.5 * length * h.length_squared() * inverse)
 }

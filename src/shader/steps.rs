@@ -3,7 +3,8 @@
 //! llvmpipe, lavapipe's machine, counts the iterations of all loops of an invocation together, and
 //! after 65535 ends every loop in silence. So every loop that a scene can lengthen is in [`LOOPS`],
 //! the only place that says how long it is. The kernel adds up what its vertices cost and starts no
-//! further path beyond a limit that leaves room for one more; the host dispatches again.
+//! further path beyond a limit that leaves room for one more; the host dispatches again. A path that alone
+//! takes more is no sample, and an error: a loop within it may have been ended.
 //!
 //! A tree's loop will have no length that is known beforehand. It counts itself: its iterations come
 //! back with the hit, the loop over vertices adds them to `steps` as it adds RAY_STEPS, and its row here
