@@ -74,7 +74,7 @@ pub(crate) fn light_weight(index: usize, placement: &Placement, effects: &Effect
         })
 }
 
-/// `Light` of `shaders/light/sphere.wesl`. Without pole frames the kernel's struct ends before theirs.
+/// `Light` of `shaders/scene/data.wesl`. Without pole frames the kernel's struct ends before theirs.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 #[expect(missing_docs, reason = "the members are those of the kernel's struct")]
