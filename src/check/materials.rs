@@ -70,7 +70,9 @@ const BASIS: f64 = 2.0e-7;
 /// others; w as the row's fourth number.
 fn normal(random: &mut Random, i: usize, w: f64) -> Row {
     let small = random.magnitude(-8.0, -1.0);
-    let across = (random.direction() * DVec3::new(1.0, 1.0, 0.0)).normalize();
+    let across = random.direction() * DVec3::new(1.0, 1.0, 0.0);
+    // Along z there is none.
+    let across = across.try_normalize().unwrap_or(DVec3::X);
     let d = match i % 8 {
         0 => [
             DVec3::X,
