@@ -5,6 +5,7 @@
 //! one, those of all scenes, and a random sample of the rest, all completed by what their effects need.
 
 mod common;
+mod thorough;
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -23,8 +24,8 @@ use rayon::prelude::*;
 
 type Set = BTreeSet<Effect>;
 
-/// Sets drawn at random.
-const SAMPLED: usize = 1000;
+/// Sets drawn at random, in the short form and in the long one.
+const SAMPLED: [usize; 2] = [150, 1500];
 
 fn every() -> impl DoubleEndedIterator<Item = Effect> + Clone {
     table().iter().map(|row| row.effect)
@@ -397,7 +398,7 @@ fn all_and_all_but_one() {
 fn a_sample_of_the_rest() {
     let mut random = Random::new("sets of effects");
     let mut sets = BTreeSet::new();
-    while sets.len() < SAMPLED {
+    while sets.len() < SAMPLED[usize::from(thorough::thorough())] {
         // From sparse to dense, in any order.
         let share = random.range(0.1, 0.9);
         let mut order: Vec<(f64, Effect)> = every().map(|e| (random.unit(), e)).collect();

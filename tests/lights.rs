@@ -273,9 +273,9 @@ fn lamps_close_by_and_walls_are_sampled_without_bias() {
     // More than are weighed at a vertex: they are drawn from the table.
     let scenes = [0, MOST_WEIGHED].map(|more| [(close_lamps(more), more), (walls(more), more)]);
     for (scene, more) in scenes.into_iter().flatten() {
-        let reference = rendered(&scene, Integrator::Bsdf, 1 << 15);
+        let reference = rendered(&scene, Integrator::Bsdf, 1 << 14);
         for how in SAMPLED {
-            let film = sampled(&scene, how, 1 << 13);
+            let film = sampled(&scene, how, 1 << 12);
             let (z, bias) = apart(&film, &reference, 1.0);
             eprintln!("{how:?}, {more} more: z = {z:.2}, bias {bias:.2e}");
             assert!(z.abs() < 3.9, "{how:?}, {more}: {z} deviations, {bias:e}");

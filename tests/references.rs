@@ -6,6 +6,7 @@
 //! fails, as the companions show.
 
 mod common;
+mod thorough;
 
 use std::path::Path;
 
@@ -16,8 +17,13 @@ use gpu_trace::materials::MaterialKind;
 use gpu_trace::scene::Scene;
 use gpu_trace::verify::picture_of;
 
-/// Samples a pixel.
-const SPP: u64 = 16_384;
+/// Samples a pixel, in the short form and in the long one: the interval of the bias is a twentieth of a
+/// percent wide at most, half of what it may be, and with the long form half of that.
+const SPP: [u64; 2] = [4096, 16_384];
+fn spp() -> u64 {
+    SPP[usize::from(thorough::thorough())]
+}
+
 /// Bound of the bias of the mean, relative.
 const EQUIVALENT: f64 = 1.0e-3;
 
@@ -63,7 +69,7 @@ fn compare(name: &str, film: &Film) -> Verdict {
             let v = f64::from(variance.pixels[i][c]);
             // On a rim a short render may have missed the brighter side, and with it its own
             // variance: take at least what one sample of the reference has (131072 of them).
-            let own_variance = own_variance[c].max(v * 131_072.0 / SPP as f64);
+            let own_variance = own_variance[c].max(v * 131_072.0 / spp() as f64);
             // Pixels of constant radiance: the reference is rounded to f32.
             let v = own_variance + v + (1.0e-5 * r).powi(2);
             worst_pixel = worst_pixel.max((own[c] - r).abs() / v.sqrt());
@@ -84,7 +90,7 @@ fn compare(name: &str, film: &Film) -> Verdict {
 }
 
 fn render(scene: &Scene) -> Film {
-    let settings = gpu_trace::verify::settings(scene, scene.width, scene.height, SPP);
+    let settings = gpu_trace::verify::settings(scene, scene.width, scene.height, spp());
     common::render_gpu(scene, &settings)
 }
 
