@@ -25,7 +25,7 @@ use rayon::prelude::*;
 type Set = BTreeSet<Effect>;
 
 /// Sets drawn at random, in the short form and in the long one.
-const SAMPLED: [usize; 2] = [150, 1500];
+const SAMPLED: [usize; 2] = [60, 1500];
 
 fn every() -> impl DoubleEndedIterator<Item = Effect> + Clone {
     table().iter().map(|row| row.effect)

@@ -2,6 +2,7 @@
 //! are a function of seed, pixel and index alone.
 
 mod common;
+mod thorough;
 
 use common::{gpu_renderer, render_cpu, render_gpu, scene_file};
 use glam::DVec3;
@@ -78,8 +79,9 @@ fn small(scene: &Scene, sampler: Sampler, spp: u64, seed: u64) -> Settings {
 fn error_bars_are_true() {
     let scene = scene_file("scenes/lecture.toml");
     for sampler in SAMPLERS {
-        // Scrambles of 4, of 4 and 16, and of all lengths.
-        for spp in [64, 256, 512] {
+        // Scrambles of 4, of 4 and 16, and in the long form of all lengths.
+        let all: &[u64] = &[64, 256, 512];
+        for &spp in &all[..if thorough::thorough() { 3 } else { 2 }] {
             let (z, ratio) = bars(400, |seed| {
                 let film = render_cpu(&scene, &small(&scene, sampler, spp, seed));
                 let of = |i| {

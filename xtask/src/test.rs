@@ -58,11 +58,24 @@ const ONCE: [&str; 24] = [
 /// Of these only what the filter finds runs on every driver: devices that fail.
 const PARTLY: [(&str, &str); 1] = [("faults", "device")];
 
-/// That a test can fail, which its companion shows, is no matter of the driver either.
-const COMPANIONS: [&str; 2] = ["--skip", "companion"];
+/// Tests of the other files of which one driver's answer is enough: companions, since that a test can fail
+/// is no matter of the driver; those that link kernels and run none; and those of light transport, as above.
+const SKIPPED: [&str; 11] = [
+    "companion",
+    "all_estimators_converge_to_the_same",
+    "error_bars_are_true",
+    "every_estimator_has_the_same_classes",
+    "every_loop_is_accounted_for",
+    "few_storage_buffers_are_bound",
+    "glsl_has_the_same_layouts",
+    "lamps_close_by_and_walls_are_sampled_without_bias",
+    "light_goes_both_ways",
+    "nothing_is_too_dark",
+    "the_reference_without_light_sampling_agrees",
+];
 
 /// These take longest, and so begin first.
-const LONGEST: [&str; 3] = ["price", "check", "hazards"];
+const LONGEST: [&str; 5] = ["effects", "lights", "samplers", "price", "check"];
 
 /// What the program is asked on every driver after the tests.
 const COMMANDS: [&[&str]; 2] = [&["devices"], &["check", "--quick"]];
@@ -159,7 +172,12 @@ fn choose(tests: &[Tests], filters: &[String], elsewhere: bool) -> Vec<(Tests, V
             let mut filters = filters.to_vec();
             if elsewhere {
                 filters.extend(part.map(|(_, filter)| (*filter).to_owned()));
-                filters.extend(COMPANIONS.map(String::from));
+                filters.extend(
+                    SKIPPED
+                        .iter()
+                        .flat_map(|name| ["--skip", name])
+                        .map(String::from),
+                );
             }
             (tests.clone(), filters)
         })
@@ -224,7 +242,7 @@ fn summarize(
 
 #[cfg(test)]
 mod tests {
-    use super::{LONGEST, ONCE, PARTLY};
+    use super::{LONGEST, ONCE, PARTLY, SKIPPED};
     use crate::root;
 
     /// A name that no file has any more would choose nothing, in silence.
@@ -235,6 +253,16 @@ mod tests {
             let place = root().join("tests").join(name);
             let there = place.with_extension("rs").exists() || place.join("main.rs").exists();
             assert!(there || ["gpu_trace", "xtask"].contains(name), "{name}");
+        }
+    }
+
+    #[test]
+    fn skipped_tests_are_there() {
+        let folder = std::fs::read_dir(root().join("tests")).expect("tests/");
+        let files = folder.filter_map(|entry| std::fs::read_to_string(entry.ok()?.path()).ok());
+        let all: String = files.collect();
+        for name in SKIPPED {
+            assert!(all.contains(&format!("fn {name}")), "{name}");
         }
     }
 
