@@ -43,6 +43,7 @@ pub mod ledger;
 pub mod materials;
 pub mod numbers;
 pub mod output;
+pub mod particles;
 pub mod placement;
 pub mod reference;
 pub mod render;

@@ -1,10 +1,11 @@
 //! The options of `render` as they are typed.
 
 use std::ops::Range;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::Args;
+use glam::DVec3;
 
 use super::choices::{self, Wanted};
 use super::fault::Fault;
@@ -13,7 +14,9 @@ use crate::backend::{BackendChoice, BackendKind};
 use crate::error::{Error, Result};
 use crate::output::{Aov, ProgressMode};
 use crate::sampler::Sampler;
-use crate::scene::{MAX_BOUNCES, Scene};
+use crate::scene::particles::Map;
+use crate::scene::particles::direct::Look;
+use crate::scene::{Loaded, MAX_BOUNCES, Scene, builtin};
 use crate::settings::{
     DEFAULT_TERMINATION, GeometryChoice, Integrator, LightSampling, MAXIMUM_SPP, Offset, Rect,
     Settings,
@@ -28,7 +31,7 @@ use crate::settings::{
 pub struct RenderArgs {
     #[arg(
         value_name = "SCENE",
-        help = "A scene file, or the name of a built-in scene [default: lecture]"
+        help = "A scene file, a particle file (.pdb, .cif, .xyz, .dump, .data, .csv, .npy, .ply; plain or .gz), or the name of a built-in scene [default: lecture]"
     )]
     pub scene: Option<String>,
 
@@ -256,6 +259,36 @@ pub struct RenderArgs {
     pub threads: Option<u16>,
     #[arg(
         long,
+        value_name = "COLUMN",
+        help_heading = "Particle files",
+        help = "What colours the particles: element, or a column [default: element where the file has them]"
+    )]
+    pub color_by: Option<String>,
+    #[arg(
+        long,
+        value_name = "RADIUS",
+        help_heading = "Particle files",
+        help = "Their radii: a number, a column, or vdw or covalent, in ångström [default: the column radius, or vdw]"
+    )]
+    pub radius_by: Option<String>,
+    #[arg(
+        long,
+        value_name = "NAME",
+        help_heading = "Particle files",
+        value_parser = choices::map(),
+        help = "The colour map of a column [default: viridis]"
+    )]
+    pub map: Option<Map>,
+    #[arg(
+        long,
+        value_name = "R,G,B",
+        help_heading = "Particle files",
+        value_parser = values::background,
+        help = "Radiance of the background, and of the light from all around: white, black or R,G,B [default: white]"
+    )]
+    pub background: Option<DVec3>,
+    #[arg(
+        long,
         value_name = "KIND@WINDOW",
         hide = true,
         help = "Let something fail, for tests"
@@ -264,12 +297,18 @@ pub struct RenderArgs {
 }
 
 impl RenderArgs {
-    /// The scene file, if the scene is one: no output may replace it.
-    pub(super) fn scene_file(&self) -> Option<&Path> {
-        self.scene
-            .as_deref()
-            .map(Path::new)
-            .filter(|path| path.is_file())
+    /// The scene.
+    ///
+    /// # Errors
+    /// Those of [`builtin::resolve_as`].
+    pub(super) fn load(&self) -> Result<Loaded> {
+        let look = Look {
+            color_by: self.color_by.clone(),
+            radius_by: self.radius_by.clone(),
+            map: self.map,
+            background: self.background,
+        };
+        builtin::resolve_as(self.scene.as_deref(), &look)
     }
 
     /// The layers, each once.

@@ -5,6 +5,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
 use crate::backend::BackendKind;
 use crate::sampler::Sampler;
+use crate::scene::particles::Map;
 use crate::settings::{GeometryChoice, Integrator, LightSampling};
 
 /// Lets `value_enum` take the names of a type's `ALL`.
@@ -51,6 +52,12 @@ pub(super) fn backend() -> impl TypedValueParser<Value = Wanted> {
     let kinds = BackendKind::ALL.iter().map(|kind| kind.name());
     PossibleValuesParser::new(std::iter::once("auto").chain(kinds))
         .map(|name| BackendKind::of_name(&name).map_or(Wanted::Auto, Wanted::Only))
+}
+
+/// The name of a colour map.
+pub(super) fn map() -> impl TypedValueParser<Value = Map> {
+    PossibleValuesParser::new(Map::ALL.iter().map(|map| map.name()))
+        .map(|name| Map::of_name(&name).unwrap_or_default())
 }
 
 /// `on` or `off`.

@@ -8,17 +8,16 @@ use crate::effects::Effects;
 use crate::error::{Error, Result};
 use crate::job::prepare;
 use crate::output::{atomic, check_all};
-use crate::scene::builtin;
 use crate::shader::{Stage, link};
 
 /// Runs `effects`.
 pub(super) fn run(args: &RenderArgs, json: bool) -> Result<()> {
-    let loaded = builtin::resolve(args.scene.as_deref())?;
+    let loaded = args.load()?;
     let job = prepare(&loaded.scene, &args.settings(&loaded.scene)?)?;
     let effects = job.effects();
     let kernel = link(Stage::Path, job.scene(), job.placement(), effects)?;
     if let Some(path) = &args.dump_wgsl {
-        check_all(&[path], args.scene_file().as_slice())?;
+        check_all(&[path], &loaded.inputs())?;
         atomic::write(path, kernel.wgsl.as_bytes())?;
     }
     let lines = kernel.wgsl.lines().count();

@@ -16,7 +16,6 @@ use crate::error::{Error, Result};
 use crate::forecast::{self, Forecast, Pilot};
 use crate::job::prepare;
 use crate::output::Progress;
-use crate::scene::builtin;
 use crate::settings::{MAXIMUM_SPP, Rect, Settings};
 
 pub(super) const AFTER_HELP: &str = "\
@@ -89,7 +88,7 @@ struct Quote {
 /// Runs `price`.
 pub(super) fn run(args: &PriceArgs) -> Result<()> {
     let render = &args.render;
-    let loaded = builtin::resolve(render.scene.as_deref())?;
+    let loaded = render.load()?;
     let job = prepare(&loaded.scene, &render.settings(&loaded.scene)?)?;
     let settings = job.settings();
     forecast::check(&job)?;

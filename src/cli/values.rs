@@ -3,6 +3,9 @@
 use std::ops::Range;
 use std::time::Duration;
 
+use glam::DVec3;
+
+use crate::materials::schema::MAX_MAGNITUDE;
 use crate::scene::{MAX_SIDE, MAX_SPP};
 use crate::settings::{Rect, TERMINATIONS};
 
@@ -109,6 +112,33 @@ pub(super) fn range(text: &str) -> Result<Range<u64>, String> {
         return Err("sample indices go up to 2^48".into());
     }
     Ok(range)
+}
+
+/// `white`, `black` or `R,G,B`: a radiance.
+pub(super) fn background(text: &str) -> Result<DVec3, String> {
+    let wrong = || {
+        format!(
+            "neither white nor black nor three numbers from 0 to {MAX_MAGNITUDE:e}, as in 0.5,0.6,1"
+        )
+    };
+    let numbers: Vec<f64> = match text {
+        "white" => vec![1.0; 3],
+        "black" => vec![0.0; 3],
+        _ => {
+            let numbers = text.split(',').map(|number| number.trim().parse());
+            numbers.collect::<Result<_, _>>().map_err(|_| wrong())?
+        }
+    };
+    let [r, g, b] = numbers[..] else {
+        return Err(wrong());
+    };
+    let fits = [r, g, b].iter().all(|x| (0.0..=MAX_MAGNITUDE).contains(x));
+    // Without negative zeros.
+    if fits {
+        Ok(DVec3::new(r, g, b) + 0.0)
+    } else {
+        Err(wrong())
+    }
 }
 
 /// `WxH`, in pixels.

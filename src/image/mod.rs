@@ -3,7 +3,7 @@
 
 pub mod exr;
 mod format;
-mod srgb;
+pub mod srgb;
 
 pub use format::Format;
 pub use srgb::{linear, srgb};

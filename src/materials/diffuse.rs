@@ -10,7 +10,8 @@ use super::uniform::cosine_moment;
 use super::{Bsdf, BsdfSample, BsdfValue, Event, Form, MemberValue, Surface, Value};
 use crate::reference::core::sampling::cosine_direction;
 
-pub(super) const NAME: &str = "diffuse";
+/// Its type in scene files.
+pub const NAME: &str = "diffuse";
 
 pub(super) const FORMS: &[Form] = &[Form {
     what: "Lambert's law",

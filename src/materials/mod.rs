@@ -102,6 +102,33 @@ pub struct MaterialType {
     pub cases: fn() -> Vec<MaterialKind>,
 }
 
+impl MaterialType {
+    /// The key of its colour, if that is all that it must be told.
+    fn color_key(&self) -> Option<String> {
+        let schema = (self.schema)(&mut SchemaGenerator::default());
+        let [key] = schema.get("required")?.as_array()?.as_slice() else {
+            return None;
+        };
+        let key = key.as_str()?;
+        let items = &schema.get("properties")?[key]["items"];
+        // A share of the light.
+        (items["maximum"] == 1.0).then(|| key.to_owned())
+    }
+
+    /// Whether there is a material of this type for each colour.
+    #[must_use]
+    pub fn has_colors(&self) -> bool {
+        self.color_key().is_some()
+    }
+
+    /// The material of this type with that colour; `None` if it must be told more.
+    #[must_use]
+    pub fn of_color(&self, color: DVec3) -> Option<MaterialKind> {
+        let table = serde_json::json!({ "type": self.name, self.color_key()?: color.to_array() });
+        serde_json::from_value(table).ok()
+    }
+}
+
 macro_rules! materials {
     ($($module:ident :: $Type:ident),* $(,)?) => {
         $(pub mod $module;)*
@@ -191,4 +218,24 @@ pub fn schemas(generator: &mut SchemaGenerator) -> Vec<(&'static str, Schema)> {
 #[must_use]
 pub fn luminance(v: DVec3) -> f64 {
     v.dot(DVec3::new(0.2126, 0.7152, 0.0722))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn those_that_need_a_colour_alone_have_one() {
+        let color = DVec3::new(0.25, 0.5, 0.75);
+        let colored: Vec<_> = ALL
+            .iter()
+            .filter(|material| material.has_colors())
+            .collect();
+        let names: Vec<_> = colored.iter().map(|material| material.name).collect();
+        assert_eq!(names, ["diffuse", "mirror"]);
+        for material in colored {
+            let made = material.of_color(color).expect(material.name);
+            assert_eq!((made.name(), made.color()), (material.name, color));
+        }
+    }
 }

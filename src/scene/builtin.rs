@@ -3,8 +3,10 @@
 use std::path::{MAIN_SEPARATOR, Path};
 
 use super::load::{Loaded, load_file, load_str};
+use super::particles::direct::{self, Look};
 use super::suggest::nearest;
 use crate::error::{Error, Result};
+use crate::particles::Format;
 
 /// The scene that is rendered when none is named.
 pub const DEFAULT: &str = "lecture";
@@ -57,12 +59,31 @@ pub fn get(name: &str) -> Option<&'static Builtin> {
 
 /// The scene that a command line's `SCENE` means.
 ///
-/// Nothing means the default scene. A word with a path separator or ending in `.toml` is always a
+/// Nothing means the default scene. A word that ends as a particle file does is one. A word with a path separator or ending in `.toml` is always a
 /// file. Any other word is an existing file, else a built-in scene.
 ///
 /// # Errors
 /// Those of [`load_file`], and [`Error::Usage`] for a word that is neither.
 pub fn resolve(argument: Option<&str>) -> Result<Loaded> {
+    resolve_as(argument, &Look::default())
+}
+
+/// The same, with particle files shown as `look` says.
+///
+/// # Errors
+/// Those of [`resolve`], and [`Error::Usage`] if a look is asked for and the word is no particle file.
+pub fn resolve_as(argument: Option<&str>, look: &Look) -> Result<Loaded> {
+    let particles = argument
+        .map(Path::new)
+        .filter(|path| Format::of_path(path).is_some());
+    if let Some(path) = particles {
+        return direct::load(path, look);
+    }
+    if let Some(option) = look.given() {
+        return Err(Error::Usage(format!(
+            "{option}: it is for particle files; in a scene file it is a key of `[[particles]]`"
+        )));
+    }
     let word = argument.unwrap_or(DEFAULT);
     let separator = word.contains('/') || word.contains(MAIN_SEPARATOR);
     let path = Path::new(word);

@@ -16,7 +16,9 @@ use serde_json::{Value, json};
 use toml::Spanned;
 
 use crate::materials::schema::{MAX_MAGNITUDE, radiance, vector};
-use crate::materials::{MaterialKind, schemas};
+use crate::materials::{self, MaterialKind, diffuse, schemas};
+use crate::particles::Format;
+use crate::scene::particles::Map;
 
 /// The largest width and height of an image, in pixels.
 pub const MAX_SIDE: u32 = 65_536;
@@ -24,6 +26,8 @@ pub const MAX_SIDE: u32 = 65_536;
 pub const MAX_SPP: u64 = 1 << 48;
 /// The largest number of bounces of a path: far more than any path survives roulette for.
 pub const MAX_BOUNCES: u32 = 65_535;
+/// The largest number of a frame of a trajectory.
+const MAX_FRAME: u64 = u32::MAX as u64;
 
 /// A scene of spheres for gpu-trace.
 ///
@@ -51,6 +55,9 @@ pub(super) struct SceneFile {
     /// The spheres.
     #[serde(default)]
     pub(super) sphere: Vec<SphereTable>,
+    /// Files of particles, each of which is a sphere.
+    #[serde(default)]
+    pub(super) particles: Vec<ParticlesTable>,
 }
 
 /// A pinhole or thin-lens camera.
@@ -194,6 +201,116 @@ pub(super) struct SphereTable {
     #[serde(default)]
     #[schemars(with = "i32", range(min = i32::MIN, max = i32::MAX))]
     pub(super) priority: Option<Spanned<i32>>,
+}
+
+/// A file of particles, each of which is a sphere.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ParticlesTable {
+    /// The file, plain or gzip; relative to the scene file's folder.
+    #[schemars(with = "String")]
+    pub(super) file: Spanned<String>,
+    /// Its format; by its ending without this key.
+    #[serde(default)]
+    #[schemars(schema_with = "format_names")]
+    pub(super) format: Option<String>,
+    /// Which frame of a trajectory; 0 is the first.
+    #[serde(default)]
+    #[schemars(with = "u64", range(min = 0, max = MAX_FRAME), extend("default" = 0))]
+    pub(super) frame: Option<u64>,
+    /// The radius: a number, the name of a column, or the elements' "vdw" or "covalent" radii in ångström.
+    /// Without this key a column `radius`, else "vdw".
+    #[serde(default)]
+    #[schemars(schema_with = "radius")]
+    pub(super) radius: Option<Spanned<RadiusValue>>,
+    /// The name of the material of all; or `color_by`.
+    #[serde(default)]
+    #[schemars(with = "String")]
+    pub(super) material: Option<Spanned<String>>,
+    /// What colours them: "element", or the name of a column.
+    #[serde(default)]
+    #[schemars(with = "String")]
+    pub(super) color_by: Option<Spanned<String>>,
+    /// The colour map of a column.
+    #[serde(default)]
+    #[schemars(schema_with = "map_names")]
+    pub(super) map: Option<Spanned<String>>,
+    /// The values of the column at the map's ends; without this key its least and largest.
+    #[serde(default)]
+    #[schemars(schema_with = "ends")]
+    pub(super) range: Option<Spanned<[f64; 2]>>,
+    /// The type of the material of each colour.
+    #[serde(default)]
+    #[schemars(schema_with = "colored_types")]
+    pub(super) material_type: Option<Spanned<String>>,
+    /// From the file's coordinates to the scene's: a 4x4 matrix by rows, of a rotation, a shift and one scale
+    /// for all directions.
+    #[serde(default)]
+    #[schemars(schema_with = "matrix")]
+    pub(super) transform: Option<Spanned<[[f64; 4]; 4]>>,
+    /// Which particles are kept, as in "0 < x < 10 and element != H".
+    #[serde(default)]
+    #[schemars(with = "String")]
+    pub(super) select: Option<Spanned<String>>,
+}
+
+/// A number or a word.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(untagged)]
+pub(super) enum RadiusValue {
+    Number(f64),
+    Word(String),
+}
+
+fn radius(_: &mut SchemaGenerator) -> Schema {
+    json_schema!({ "type": ["number", "string"], "exclusiveMinimum": 0.0, "maximum": MAX_MAGNITUDE })
+}
+
+fn words<'w>(words: impl Iterator<Item = &'w str>, default: Option<&str>) -> Schema {
+    let words: Vec<&str> = words.collect();
+    let mut schema = json_schema!({ "type": "string", "enum": words });
+    if let Some(default) = default {
+        schema.insert("default".into(), json!(default));
+    }
+    schema
+}
+
+fn format_names(_: &mut SchemaGenerator) -> Schema {
+    words(Format::ALL.iter().map(|format| format.name()), None)
+}
+
+fn map_names(_: &mut SchemaGenerator) -> Schema {
+    words(
+        Map::ALL.iter().map(|map| map.name()),
+        Some(Map::default().name()),
+    )
+}
+
+fn colored_types(_: &mut SchemaGenerator) -> Schema {
+    let colored = materials::ALL
+        .iter()
+        .filter(|material| material.has_colors());
+    words(colored.map(|material| material.name), Some(diffuse::NAME))
+}
+
+fn numbers(count: usize) -> serde_json::Value {
+    json!({
+        "type": "array",
+        "items": { "type": "number", "minimum": -MAX_MAGNITUDE, "maximum": MAX_MAGNITUDE },
+        "minItems": count,
+        "maxItems": count,
+    })
+}
+
+fn ends(_: &mut SchemaGenerator) -> Schema {
+    let Value::Object(schema) = numbers(2) else {
+        return Schema::default();
+    };
+    schema.into()
+}
+
+fn matrix(_: &mut SchemaGenerator) -> Schema {
+    json_schema!({ "type": "array", "items": numbers(4), "minItems": 4, "maxItems": 4 })
 }
 
 fn point(_: &mut SchemaGenerator) -> Schema {

@@ -5,7 +5,7 @@
 
 use std::fs::{self, File};
 use std::io::{self, Read};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
 use serde::Deserialize;
@@ -28,8 +28,18 @@ pub struct Loaded {
     pub name: String,
     /// What is legal and probably not meant, each rendered with file, line, column and the line.
     pub warnings: Vec<String>,
+    /// The files that it was read from.
+    pub files: Vec<PathBuf>,
     /// Hash of the scene's values (16 hexadecimal digits), see [`content_hash`].
     pub hash: String,
+}
+
+impl Loaded {
+    /// The files that it was read from: no output may replace them.
+    #[must_use]
+    pub fn inputs(&self) -> Vec<&Path> {
+        self.files.iter().map(PathBuf::as_path).collect()
+    }
 }
 
 /// Loads a scene file.
@@ -47,17 +57,23 @@ pub fn load_file(path: &Path) -> Result<Loaded> {
         .file_stem()
         .map_or_else(|| shown.clone(), |stem| stem.to_string_lossy().into_owned());
     match str::from_utf8(&bytes) {
-        Ok(text) => load(name, &shown, text),
+        Ok(text) => {
+            let folder = path.parent().unwrap_or(Path::new(""));
+            let mut loaded = load(name, &shown, text, folder)?;
+            loaded.files.push(path.to_owned());
+            Ok(loaded)
+        }
         Err(error) => Err(not_utf8(&shown, &bytes, error.valid_up_to())),
     }
 }
 
-/// Loads a scene from text. The name is the scene's, and stands for the file in messages.
+/// Loads a scene from text. The name is the scene's, and stands for the file in messages; files that it names
+/// are relative to the current folder.
 ///
 /// # Errors
 /// [`Error::Scene`] if the text is not a scene.
 pub fn load_str(name: &str, text: &str) -> Result<Loaded> {
-    load(name.to_owned(), name, text)
+    load(name.to_owned(), name, text, Path::new(""))
 }
 
 fn read(path: &Path) -> io::Result<Vec<u8>> {
@@ -98,25 +114,26 @@ fn failed(shown: &str, text: &str, errors: Vec<Problem>) -> Error {
     Error::Scene(report.error_text(shown, text).unwrap_or_default())
 }
 
-fn load(name: String, shown: &str, text: &str) -> Result<Loaded> {
+fn load(name: String, shown: &str, text: &str, folder: &Path) -> Result<Loaded> {
     let mut report = Report::default();
-    let scene = parse(text, &mut report);
+    let parsed = parse(text, folder, &mut report);
     if let Some(errors) = report.error_text(shown, text) {
         return Err(Error::Scene(errors));
     }
-    let Some(scene) = scene else {
+    let Some((scene, files)) = parsed else {
         return Err(Error::Scene(format!("error: {shown} is not a scene file")));
     };
     Ok(Loaded {
         hash: content_hash(&scene),
         warnings: report.warning_texts(shown, text),
         name,
+        files,
         scene,
     })
 }
 
-/// The scene; `None` after errors, which the report then holds.
-fn parse(text: &str, report: &mut Report) -> Option<Scene> {
+/// The scene and the files that it names; `None` after errors, which the report then holds.
+fn parse(text: &str, folder: &Path, report: &mut Report) -> Option<(Scene, Vec<PathBuf>)> {
     static SCHEMA: LazyLock<serde_json::Value> = LazyLock::new(json_schema);
 
     let root = DeTable::parse(text).map_err(|error| report.errors.push(syntax(&error)));
@@ -136,7 +153,7 @@ fn parse(text: &str, report: &mut Report) -> Option<Scene> {
     let keys = validate::material_keys(root.get_ref());
     let file = SceneFile::deserialize(Deserializer::from(root))
         .map_err(|error| report.errors.push(syntax(&error)));
-    validate::scene(file.ok()?, &keys, report)
+    validate::scene(file.ok()?, &keys, folder, report)
 }
 
 /// An error of the TOML parser, in words for those who know other formats.

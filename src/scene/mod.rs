@@ -9,6 +9,7 @@ mod describe;
 mod file;
 mod hash;
 pub mod load;
+pub mod particles;
 #[cfg(test)]
 mod properties;
 mod range;

@@ -143,7 +143,15 @@ fn check_value(
     place: &Place,
     report: &mut Report,
 ) {
-    let kind = schema["type"].as_str().unwrap_or("object");
+    let kind = match schema["type"].as_array() {
+        // A number or a word.
+        Some(kinds) => kinds
+            .iter()
+            .filter_map(Value::as_str)
+            .find(|kind| *kind == "string" || value.get_ref().as_str().is_none())
+            .unwrap_or("number"),
+        None => schema["type"].as_str().unwrap_or("object"),
+    };
     match (kind, value.get_ref()) {
         ("object", DeValue::Table(inner)) => {
             let path = match place.path.as_str() {
@@ -200,11 +208,13 @@ fn check_value(
         }
         ("array", DeValue::Integer(_) | DeValue::Float(_)) => {
             let number = number(value.get_ref()).unwrap_or_default();
-            let help =
-                format!("for the same value three times write `[{number}, {number}, {number}]`");
-            report
-                .errors
-                .push(wrong_type(name, value, "an array of 3 numbers").help(help));
+            let problem = wrong_type(name, value, &an_array(schema));
+            report.errors.push(match schema["minItems"].as_u64() {
+                Some(3) => problem.help(format!(
+                    "for the same value three times write `[{number}, {number}, {number}]`"
+                )),
+                _ => problem,
+            });
         }
         ("integer", DeValue::Float(_)) => {
             let problem = wrong_type(name, value, "an integer");
@@ -218,12 +228,21 @@ fn check_value(
         }
         ("array", _) => report
             .errors
-            .push(wrong_type(name, value, "an array of 3 numbers")),
+            .push(wrong_type(name, value, &an_array(schema))),
         ("object", _) => report.errors.push(wrong_type(name, value, "a table")),
         _ => {
             let wanted = format!("a{} {kind}", n(kind));
             report.errors.push(wrong_type(name, value, &wanted));
         }
+    }
+}
+
+/// What a vector or a matrix is.
+fn an_array(schema: &Value) -> String {
+    let count = |schema: &Value| schema["minItems"].as_u64().unwrap_or_default();
+    match count(&schema["items"]) {
+        0 => format!("an array of {} numbers", count(schema)),
+        inner => format!("an array of {} arrays of {inner} numbers", count(schema)),
     }
 }
 
@@ -237,6 +256,10 @@ fn length(name: &str, span: Range<usize>, length: usize, schema: &Value, report:
         return;
     };
     if length as u64 != wanted {
+        let what = match schema["items"]["minItems"].as_u64() {
+            Some(_) => "rows",
+            None => "numbers",
+        };
         let has = if length == 0 {
             "none".to_owned()
         } else {
@@ -244,7 +267,7 @@ fn length(name: &str, span: Range<usize>, length: usize, schema: &Value, report:
         };
         report.errors.push(Problem::new(
             span,
-            format!("`{name}` must have exactly {wanted} numbers"),
+            format!("`{name}` must have exactly {wanted} {what}"),
             format!("has {has}"),
         ));
     }

@@ -2,12 +2,14 @@
 
 use std::collections::{BTreeSet, HashMap};
 use std::ops::Range;
+use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 use toml::Spanned;
 use toml::de::DeTable;
 
 use super::file::{CameraTable, HandednessName, MaterialTable, SceneFile, SphereTable};
+use super::particles;
 use super::report::{Problem, Report, SHOWN};
 use super::suggest::{list, nearest};
 use super::{Camera, Handedness, Material, RenderDefaults, Scene, Sphere};
@@ -40,8 +42,15 @@ pub(super) fn material_keys(root: &DeTable<'_>) -> MaterialKeys {
     keys
 }
 
-/// The scene of a file; `None` after errors, which the report then holds.
-pub(super) fn scene(file: SceneFile, keys: &MaterialKeys, report: &mut Report) -> Option<Scene> {
+/// The scene of a file and the files that it names; `None` after errors, which the report then holds.
+///
+/// Files that it names are looked for in `folder`.
+pub(super) fn scene(
+    file: SceneFile,
+    keys: &MaterialKeys,
+    folder: &Path,
+    report: &mut Report,
+) -> Option<(Scene, Vec<PathBuf>)> {
     let camera = camera(&file.camera, report);
     let mut materials: Vec<_> = file
         .material
@@ -60,7 +69,7 @@ pub(super) fn scene(file: SceneFile, keys: &MaterialKeys, report: &mut Report) -
         .collect();
     // The map is ordered by name; the order of the file is what people expect to see.
     materials.sort_by_key(|(span, _)| span.start);
-    let (spans, materials): (Vec<_>, Vec<_>) = materials.into_iter().unzip();
+    let (spans, mut materials): (Vec<_>, Vec<_>) = materials.into_iter().unzip();
 
     let names: HashMap<&str, usize> = materials
         .iter()
@@ -107,11 +116,44 @@ pub(super) fn scene(file: SceneFile, keys: &MaterialKeys, report: &mut Report) -
         });
     }
 
-    if let Some(largest) = largest(&file.sphere)
-        && *largest.get_ref() < SHORTEST
-    {
+    let named: HashMap<String, usize> = names
+        .into_iter()
+        .map(|(name, index)| (name.to_owned(), index))
+        .collect();
+    let mut files = Vec::new();
+    for table in &file.particles {
+        let request = particles::request(table, folder, report);
+        let material = match &table.material {
+            None => None,
+            Some(name) => match named.get(name.get_ref()) {
+                Some(index) => Some(*index),
+                None => {
+                    let problem = unknown_material(name.get_ref(), &materials);
+                    report.errors.push(Problem {
+                        span: name.span(),
+                        ..problem
+                    });
+                    continue;
+                }
+            },
+        };
+        // Nothing is read for a file with errors.
+        let Some(request) = request.filter(|_| report.errors.is_empty()) else {
+            continue;
+        };
+        used.extend(material);
+        files.push(request.file.clone());
+        match particles::gather(&request) {
+            Ok(cloud) => particles::add(cloud, table, material, &mut materials, &mut spheres),
+            Err(fault) => report.errors.push(particles::problem(&fault, table)),
+        }
+    }
+    used.extend(spans.len()..materials.len());
+    if !spheres.is_empty() && spheres.iter().all(|sphere| sphere.radius < SHORTEST) {
+        let largest = largest(&file.sphere).map(Spanned::span);
+        let file = file.particles.first().map(|table| table.file.span());
         let message = "the spheres are too small to compute with: this is the largest `radius`";
-        let problem = Problem::new(largest.span(), message, "");
+        let problem = Problem::new(largest.or(file).unwrap_or_default(), message, "");
         report
             .errors
             .push(problem.help(format!("one of them must have at least {SHORTEST:e}")));
@@ -136,7 +178,7 @@ pub(super) fn scene(file: SceneFile, keys: &MaterialKeys, report: &mut Report) -
         return None;
     }
     warn(&scene, &spans, &used, report);
-    Some(scene)
+    Some((scene, files))
 }
 
 /// The largest radius; the first of several.

@@ -25,7 +25,6 @@ use crate::output::{
     Contents, Layer, Plane, Progress, Stats, Target, atomic, check_all, write_all,
 };
 use crate::render::{Outcome, Renderer, StoppedBy, render};
-use crate::scene::builtin;
 use crate::scene::load::Loaded;
 use crate::shader::{Stage, link};
 
@@ -154,7 +153,7 @@ fn failed(failure: &Error, outcome: &Outcome, request: &Request, written: Result
 
 /// Loads and decides everything; checks the outputs. Touches no device and no file.
 fn request(args: &RenderArgs) -> Result<Request> {
-    let loaded = builtin::resolve(args.scene.as_deref())?;
+    let loaded = args.load()?;
     let settings = args.settings(&loaded.scene)?;
     let targets = if args.output.is_empty() {
         vec![Target::parse(format!("{}.png", loaded.name))?]
@@ -172,7 +171,7 @@ fn request(args: &RenderArgs) -> Result<Request> {
     let mut outputs: Vec<&Path> = targets.iter().map(|t| t.path.as_path()).collect();
     outputs.extend(args.stats.as_deref());
     outputs.extend(args.dump_wgsl.as_deref());
-    check_all(&outputs, args.scene_file().as_slice())?;
+    check_all(&outputs, &loaded.inputs())?;
     let job = prepare(&loaded.scene, &settings)?;
     // What is needed beside is known with the device.
     check_memory(&settings.crop, LEAST_PIXEL_BYTES)?;
