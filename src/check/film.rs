@@ -2,7 +2,7 @@
 //! are 0.
 
 use super::context::Context;
-use super::{Case, Run};
+use super::Case;
 use crate::error::{Error, Result};
 use crate::film::Film;
 use crate::gpu::device::Gpu;
@@ -21,40 +21,40 @@ pub(super) const CASES: &[Case] = &[
         name: "sums of very many samples",
         setup: "a constant environment of 0.1, 0.7 and 0.3 over 1e7 samples of a pixel (2e5 in the \
                 quick form): the mean is the constant to 1e-6",
-        run: Run::On(many_samples),
+        run: many_samples,
     },
     Case {
         id: 33,
         name: "integers to floats",
         setup: "the largest words give numbers below 1; uniform by Kolmogorov and Smirnov; neighbours \
                 in pixel, sample, dimension and component correlate by less than 4/sqrt(n)",
-        run: Run::On(floats),
+        run: floats,
     },
     Case {
         id: 34,
         name: "sample indices past 2^16 and 2^32",
         setup: "the random numbers of the samples around both have the bits that the host gives them; \
                 a render across them has the reference's values",
-        run: Run::On(sample_indices),
+        run: sample_indices,
     },
     Case {
         id: 35,
         name: "images of odd sizes",
         setup: "1x1, 7x5, 8191x1: every pixel is there, and a crop has the whole image's bits",
-        run: Run::On(odd_sizes),
+        run: odd_sizes,
     },
     Case {
         id: 36,
         name: "images of several regions",
         setup: "a crop across the seam at 1024 has the whole image's bits; what no device or file can \
                 hold is refused before any work",
-        run: Run::On(seams),
+        run: seams,
     },
     Case {
         id: 37,
         name: "any split into dispatches",
         setup: "by tiles, by samples and by both: image, variance and rays have the same bits",
-        run: Run::On(dispatches),
+        run: dispatches,
     },
 ];
 

@@ -2,7 +2,7 @@
 
 use super::context::Context;
 use super::film::must;
-use super::{Case, Run};
+use super::Case;
 use crate::error::Result;
 use crate::film::{BLOCK, Film};
 use crate::job::prepare;
@@ -19,35 +19,35 @@ pub(super) const CASES: &[Case] = &[
         name: "closed furnaces",
         setup: "inside a diffuse sphere of albedo 0.5 to 1 and radius 1e-6 to 1e6 that emits 1, no \
                 roulette: the partial sum of the albedo's powers, in units of 2 N u, and no ray misses",
-        run: Run::On(furnaces),
+        run: furnaces,
     },
     Case {
         id: 30,
         name: "roulette",
         setup: "on and off have the same mean (3.9 standard errors); a path's weight is 0 or in \
                 [1/4, 1]; what loses no light does not die",
-        run: Run::On(roulette),
+        run: roulette,
     },
     Case {
         id: 31,
         name: "extreme emission, throughput and size",
         setup: "emission 1e20, radius 1e20 and 1e-20, 10000 bounces without loss, ior 0.1 to 10, \
                 lobes down to 1e-20: no sample that is not finite, and known furnaces hold",
-        run: Run::On(extremes),
+        run: extremes,
     },
     Case {
         id: 38,
         name: "a light inside a glass ball",
         setup: "an emitter of n^2 times the environment's radiance in glass, radius 1e-3 to 1e3: it \
                 cannot be seen from outside or inside, in units of 64 u",
-        run: Run::On(light_in_glass),
+        run: light_in_glass,
     },
     Case {
         id: 39,
         name: "the lecture's variance",
         setup: "closed furnaces: the blocks' variance is (1 + 2 rho m)/(1 - q) - m^2, q = \
                 4 rho^2/(3 (1 - p)), to 3.9 of its standard errors; infinite where q >= 1",
-        run: Run::On(variance_law),
+        run: variance_law,
     },
 ];
 

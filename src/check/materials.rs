@@ -8,7 +8,7 @@ use std::f64::consts::{PI, TAU};
 use glam::{DVec2, DVec3};
 
 use super::context::Context;
-use super::{Case, Run};
+use super::Case;
 use crate::error::Result;
 use crate::gpu::bsdf_probe::{BsdfInput, Evaluated, Sampled};
 use crate::gpu::probe::Probe;
@@ -26,7 +26,7 @@ pub(super) const CASES: &[Case] = &[
         name: "a basis around any normal",
         setup: "random normals, the axes and near them, z = +-0 and to within 1e-8 of -z: tangent \
                 and bitangent orthonormal, and those of f64, to 2e-7",
-        run: Run::On(basis),
+        run: basis,
     },
     Case {
         id: 23,
@@ -34,28 +34,28 @@ pub(super) const CASES: &[Case] = &[
         setup: "index ratio 1/2.4 to 2.4, cosine 1e-6 to 1 and within 1e-7 of the critical one: \
                 R in units of its bound, at most 1, and 1 in total reflection (T is what R leaves); \
                 F(i, eta) = F(t, 1/eta) in units of its bound",
-        run: Run::On(fresnel),
+        run: fresnel,
     },
     Case {
         id: 24,
         name: "narrow lobes",
         setup: "the reflective material, epsilon 1e-8 to 1, up to grazing incidence: the direction in \
                 the lobe and f cos/pdf in units of their bounds",
-        run: Run::On(narrow),
+        run: narrow,
     },
     Case {
         id: 25,
         name: "microfacets at grazing angles",
         setup: "rough metals of roughness 0.2 to 1, both cosines 1e-6 to 1: value and pdf, with Smith's \
                 shadowing and masking, those of f64 to 1e-5",
-        run: Run::On(grazing),
+        run: grazing,
     },
     Case {
         id: 27,
         name: "there and back",
         setup: "f(i, o) = f(o, i) for the reflective material, to 1e-5; light through glass and \
                 back has its old direction, to 1e-5/cos_i, and its old radiance, to 1e-5",
-        run: Run::On(reciprocity),
+        run: reciprocity,
     },
 ];
 
