@@ -15,8 +15,10 @@ mod intersection;
 mod lights;
 mod materials;
 mod placing;
+mod random;
 mod sampled;
 mod sampling;
+mod variance;
 
 pub use crate::verify::Measure;
 pub use context::Context;
@@ -53,7 +55,7 @@ pub struct Case {
 /// All cases, by number.
 #[must_use]
 pub fn cases() -> Vec<Case> {
-    let groups: [&[Case]; 8] = [
+    let groups: [&[Case]; 10] = [
         intersection::CASES,
         placing::CASES,
         lights::CASES,
@@ -62,6 +64,8 @@ pub fn cases() -> Vec<Case> {
         sampling::CASES,
         integrator::CASES,
         film::CASES,
+        random::CASES,
+        variance::CASES,
     ];
     let mut all = groups.concat();
     all.sort_by_key(|case| case.id);
