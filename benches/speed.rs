@@ -1,10 +1,11 @@
-//! `cargo bench --bench speed`: the kernel against the baseline `naive.wgsl`, side by side, and what
+//! `cargo bench --bench speed`: the kernel against the baseline `naive/kernel.wgsl`, side by side, and what
 //! the kernel's own choices are worth. Prints Markdown tables for `benches/RESULTS.md`.
 //!
 //! Every figure is a ratio of two things that ran in turns, since machines are noisy: the medians
 //! of several rounds. Nothing is asserted.
 
 mod loading;
+#[expect(dead_code, reason = "f64 is for `hazards` and the tests")]
 mod naive;
 mod offsets;
 
@@ -19,6 +20,8 @@ use gpu_trace::render::render_quietly;
 use gpu_trace::sampler::Sampler;
 use gpu_trace::scene::{Scene, builtin};
 use gpu_trace::settings::{GeometryChoice, Integrator, Rect, Settings};
+use naive::flat::FlatScene;
+use naive::kernel::Kernel;
 
 /// Rounds in which all contestants take turns.
 const ROUNDS: usize = 5;
@@ -92,6 +95,18 @@ fn ours(
     })
 }
 
+/// The baseline.
+fn baseline(scene: &Scene) -> Contestant<'static> {
+    let bounces = Settings::for_scene(scene).max_bounces;
+    let mut kernel = Kernel::new(&FlatScene::of(scene), bounces);
+    let paths = f64::from(scene.width) * f64::from(scene.height) * SPP as f64;
+    Box::new(move || {
+        let begin = Instant::now();
+        kernel.render(0..SPP as u32);
+        (paths, begin.elapsed().as_secs_f64())
+    })
+}
+
 /// One render by our kernel.
 fn film_of(scene: &Scene, settings: &Settings) -> Film {
     let job = prepare(scene, settings).unwrap_or_else(|e| panic!("{e}"));
@@ -136,7 +151,7 @@ fn against_naive() {
     compare(
         "`lecture`, 640x640, 64 bounces, the same roulette",
         &mut [
-            ("naive (baseline)", naive::contestant(&scene, SPP)),
+            ("naive (baseline)", baseline(&scene)),
             ("gpu-trace", ours(&scene, |_| (), &[])),
             (
                 "gpu-trace, list",

@@ -368,6 +368,7 @@ fn syntax_errors_look_like_the_others() {
         fov = 36.0 | fov = 36.0\nfov = 37.0 | 6:1 | duplicate key
         fov = 36.0 | fov 36 | 5:5 | a key without a value
         fov = 36.0 | fov = .5 | 5:7 | 0.5, 1.0
+        fov = 36.0 | fov = 5. | 5:9 | 0.5, 1.0
         [image] | [image | 9:7 | unclosed table
         "white" | white | 33:12 | words "in quotes"
         "left" | "left | 6:19 | invalid basic string

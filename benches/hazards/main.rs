@@ -1,5 +1,5 @@
 //! `cargo bench --bench hazards -- FOLDER [--spp N] [SCENE...]`: renders scenes that are hard in f32
-//! with the kernel, its f64 reference (the truth) and `naive.wgsl`, in batches that give standard
+//! with the kernel, its f64 reference (the truth) and `benches/naive`, in batches that give standard
 //! errors. `compare.py` adds Mitsuba, and prints and draws what came out; `cargo xtask bench hazards`
 //! runs both.
 //!
@@ -7,14 +7,13 @@
 //! shape (batches, height, width, 3). The kernel and its reference trace the same paths: their
 //! difference is rounding alone, while the others' has the noise of both.
 
-mod flat;
+#[path = "../naive/mod.rs"]
+#[expect(dead_code, reason = "variances are for the tests")]
 mod naive;
-mod naive_f64;
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use flat::FlatScene;
 use gpu_trace::gpu::device::{self, DeviceChoice};
 use gpu_trace::gpu::renderer::GpuRenderer;
 use gpu_trace::job::prepare;
@@ -22,6 +21,8 @@ use gpu_trace::reference::renderer::ReferenceRenderer;
 use gpu_trace::render::{Renderer, render_quietly};
 use gpu_trace::scene::{Scene, builtin, load};
 use gpu_trace::settings::Settings;
+use naive::flat::FlatScene;
+use naive::kernel::Kernel;
 
 /// Batches: enough for standard errors that hardly vary themselves.
 const BATCHES: u64 = 32;
@@ -110,14 +111,16 @@ impl Batches<'_> {
                 ours(renderer, &settings)
             });
         }
-        let mut naive = naive::Naive::new(&flat, bounces);
+        let mut naive = Kernel::new(&flat, bounces);
         self.run("naive", self.spp, |s| {
             naive.render(s.start as u32..s.end as u32)
         });
         // A quarter of the samples is enough to tell.
         for (name, nudge) in [("naive-f64", 1.0e-4), ("check", 1.0e-7)] {
             self.run(name, self.spp / 4, |s| {
-                naive_f64::render(&flat, bounces, nudge, s.start as u32..s.end as u32)
+                let image =
+                    naive::tracer::render(&flat, bounces, nudge, s.start as u32..s.end as u32);
+                image.mean.into_flattened()
             });
         }
     }

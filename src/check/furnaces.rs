@@ -2,9 +2,9 @@
 
 use std::f64::consts::PI;
 
+use super::Case;
 use super::context::Context;
 use super::lights::sine;
-use super::{Case, Run};
 use crate::error::Result;
 use crate::settings::Settings;
 use crate::statistics::normal_limit;
@@ -16,7 +16,7 @@ pub(super) const CASES: &[Case] = &[Case {
     setup: "radius 1e-5 to 1e6 in a constant environment: lossless diffuse, mirror and glass \
             balls vanish to 1e-3 in every pixel, a diffuse one shows its albedo, the \
             reflective one its albedo by formula, by z-test",
-    run: Run::On(furnaces),
+    run: furnaces,
 }];
 
 /// Pixels along the sides of these images.

@@ -4,8 +4,8 @@
 
 use glam::DVec3;
 
+use super::Case;
 use super::context::Context;
-use super::{Case, Run};
 use crate::error::Result;
 use crate::reference::scene::sphere::{
     Quadratic, pole_quadratic, root_interior, root_outside, sphere_quadratic,
@@ -18,49 +18,49 @@ pub(super) const CASES: &[Case] = &[
         name: "a far sphere",
         setup: "radius 1 at distances 1e3 to 1e5, impact below 0.99: distance in units of \
                 8 ulp(D) (1 + b/sqrt(R^2 - b^2)); no wrong hit or miss",
-        run: Run::On(far),
+        run: far,
     },
     Case {
         id: 3,
         name: "a huge sphere from nearby",
         setup: "radius 1e3 to 1e8, from 0.01 to 10 above or below the surface: distance in units \
                 of its bound, 1e-6 (1 + (|B| + |d|)/S) and the rounding of C",
-        run: Run::On(huge),
+        run: huge,
     },
     Case {
         id: 4,
         name: "a tiny sphere, left and crossed",
         setup: "radius 1e-8 to 1e-3: a leaving ray does not hit it again, one that goes inside \
                 comes to the far side after the chord, to 1e-6 r",
-        run: Run::On(tiny),
+        run: tiny,
     },
     Case {
         id: 6,
         name: "grazing rays",
         setup: "impact R (1 +- e), e = 1e-7 to 1e-3, from distances to 1e3: hit or miss is wrong \
                 only within 4 ulp(D) of the silhouette",
-        run: Run::On(grazing),
+        run: grazing,
     },
     Case {
         id: 7,
         name: "from inside",
         setup: "from the exact centre, from 1 ulp within the wall and between, radius 1e-4 to \
                 1e4: distance in units of 8 ulp(R) (1 + R/s)",
-        run: Run::On(inside),
+        run: inside,
     },
     Case {
         id: 8,
         name: "leaving rays do not return",
         setup: "radius 1e-4 to 1e4 and, by their poles, 1e4 to 1e8: leaving rays, n.d = 0 and \
                 +-1e-8 among them, must not hit the sphere that they are on",
-        run: Run::On(reintersect),
+        run: reintersect,
     },
     Case {
         id: 9,
         name: "directions of any length",
         setup: "|d| = 1e-15 to 1e15, powers of two: t |d| is that of the unit direction to 4 ulp; \
                 other lengths: t within 4 ulp(D) (1 + b/sqrt(R^2 - b^2))",
-        run: Run::On(lengths),
+        run: lengths,
     },
 ];
 

@@ -4,7 +4,7 @@
 //! Their truth is known exactly, or comes from the same paths in f64.
 
 use super::context::Context;
-use super::{Case, Run, sampled};
+use super::{Case, sampled};
 use crate::error::Result;
 use crate::film::Film;
 use crate::scene::Scene;
@@ -18,7 +18,7 @@ pub(super) const CASES: &[Case] = &[
         name: "a far light, sampled",
         setup: "a light of 1e-8 to 1e-1 of its distance, above, across and on the horizon: solid \
                 angle and projected solid angle against f64, directions within the light",
-        run: Run::On(sampled::far),
+        run: sampled::far,
     },
     Case {
         id: 17,
@@ -26,7 +26,7 @@ pub(super) const CASES: &[Case] = &[
         setup: "a light at 1 + e radii, e = 1e-7 to 1e-1: solid angle and projected solid angle \
                 within 1e-6/sqrt(2 e) of f64, or left to BSDF sampling below f32's resolution; walls of \
                 radius 1e3 to 1e8 from 1e-6 to 10 above them, as well as f32 knows the height",
-        run: Run::On(sampled::near),
+        run: sampled::near,
     },
     Case {
         id: 18,
@@ -34,14 +34,14 @@ pub(super) const CASES: &[Case] = &[
         setup: "camera and diffuse balls inside an emitting sphere, radius 1e-5 to 1e6: every \
                 direction hits, the furnace has its exact radiance, and over black walls no pixel \
                 is off the same paths in f64 by more than one sample",
-        run: Run::On(inside),
+        run: inside,
     },
     Case {
         id: 19,
         name: "a light does not light itself",
         setup: "an emitter alone, radius 1e-5 to 1e6, diffuse, mirror and reflective, from 0.001 \
                 to 3 radii away: every sample is exactly its emission or 0",
-        run: Run::On(itself),
+        run: itself,
     },
     Case {
         id: 20,
@@ -49,7 +49,7 @@ pub(super) const CASES: &[Case] = &[
         setup: "a lamp over a floor, radius 1e-5 to 1e6: no sample is blocked by the light's own \
                 limb; a lamp in a diffuse hollow sphere: both strategies together, and light \
                 sampling alone, give the exact radiance",
-        run: Run::On(sampled::strategies),
+        run: sampled::strategies,
     },
     Case {
         id: 21,
@@ -57,7 +57,7 @@ pub(super) const CASES: &[Case] = &[
         setup: "emission 2^20 beside 2^-20: each side bit for bit its image at emission 1, scaled, \
                 and within its own error of f64; all times 2^66 and 2^-66: the mean scales by \
                 2^k and its variance by 4^k, exactly",
-        run: Run::On(bright_and_dim),
+        run: bright_and_dim,
     },
 ];
 

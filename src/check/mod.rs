@@ -15,8 +15,10 @@ mod intersection;
 mod lights;
 mod materials;
 mod placing;
+mod random;
 mod sampled;
 mod sampling;
+mod variance;
 
 pub use crate::verify::Measure;
 pub use context::Context;
@@ -46,23 +48,14 @@ pub struct Case {
     pub name: &'static str,
     /// What is set up, and what is measured.
     pub setup: &'static str,
-    /// How it is run.
-    pub run: Run,
-}
-
-/// How a case is run.
-#[derive(Clone, Copy, Debug)]
-pub enum Run {
-    /// By this function.
-    On(fn(&Context) -> Result<Measure>),
-    /// Not at all: the program has nothing that the case concerns.
-    NotApplicable(&'static str),
+    /// Runs it.
+    pub run: fn(&Context) -> Result<Measure>,
 }
 
 /// All cases, by number.
 #[must_use]
 pub fn cases() -> Vec<Case> {
-    let groups: [&[Case]; 8] = [
+    let groups: [&[Case]; 10] = [
         intersection::CASES,
         placing::CASES,
         lights::CASES,
@@ -71,6 +64,8 @@ pub fn cases() -> Vec<Case> {
         sampling::CASES,
         integrator::CASES,
         film::CASES,
+        random::CASES,
+        variance::CASES,
     ];
     let mut all = groups.concat();
     all.sort_by_key(|case| case.id);
@@ -85,8 +80,6 @@ pub enum Verdict {
     Pass,
     /// Some did not.
     Fail,
-    /// The program has nothing that the case concerns.
-    NotApplicable,
 }
 
 /// A case's result.
@@ -104,15 +97,15 @@ pub struct CaseReport {
     pub failures: u64,
     /// Their share; `None` without trials.
     pub failure_rate: Option<f64>,
-    /// The largest error, in `unit`; `None` without trials, or if it is no number.
+    /// The largest error, in `unit`; `None` if it is no number.
     pub worst: Option<f64>,
     /// The largest error that passes, in `unit`.
-    pub limit: Option<f64>,
+    pub limit: f64,
     /// What errors are measured in.
     pub unit: &'static str,
     /// The result.
     pub verdict: Verdict,
-    /// Where the worst error is, or why the case does not apply.
+    /// Where the worst error is.
     pub why: String,
 }
 
@@ -122,38 +115,24 @@ impl Case {
     /// # Errors
     /// If the device fails: no case can be judged then.
     pub fn report(&self, context: &Context) -> Result<CaseReport> {
-        let mut report = CaseReport {
+        let measure = (self.run)(context)?;
+        let (trials, failures) = (measure.trials(), measure.failures());
+        Ok(CaseReport {
             id: self.id,
             name: self.name,
             setup: self.setup,
-            trials: 0,
-            failures: 0,
-            failure_rate: None,
-            worst: None,
-            limit: None,
-            unit: "",
-            verdict: Verdict::NotApplicable,
-            why: String::new(),
-        };
-        match self.run {
-            Run::NotApplicable(why) => report.why = why.into(),
-            Run::On(run) => {
-                let measure = run(context)?;
-                report.verdict = if measure.passes() {
-                    Verdict::Pass
-                } else {
-                    Verdict::Fail
-                };
-                report.trials = measure.trials();
-                report.failures = measure.failures();
-                report.failure_rate = (measure.trials() > 0)
-                    .then(|| measure.failures() as f64 / measure.trials() as f64);
-                report.worst = Some(measure.worst()).filter(|x| x.is_finite());
-                report.limit = Some(measure.limit());
-                report.unit = measure.unit();
-                report.why = measure.place().to_owned();
-            }
-        }
-        Ok(report)
+            trials,
+            failures,
+            failure_rate: (trials > 0).then(|| failures as f64 / trials as f64),
+            worst: Some(measure.worst()).filter(|x| x.is_finite()),
+            limit: measure.limit(),
+            unit: measure.unit(),
+            verdict: if measure.passes() {
+                Verdict::Pass
+            } else {
+                Verdict::Fail
+            },
+            why: measure.place().to_owned(),
+        })
     }
 }

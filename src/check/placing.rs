@@ -1,8 +1,8 @@
 //! Cases 2, 5 and 10 to 15: where things are. Whole renders; the truth is another render that must
 //! be the same, the f64 reference on the same paths, or a number.
 
+use super::Case;
 use super::context::Context;
-use super::{Case, Run};
 use crate::error::Result;
 use crate::film::Film;
 use crate::scene::Scene;
@@ -16,53 +16,53 @@ pub(super) const CASES: &[Case] = &[
         name: "a scene far from the origin",
         setup: "moved by (d, -d, d): the same bits for d = 2^k up to 2^26, where sums are exact in \
                 f64; for d = 1e7/3, share of the values that are off by more than 0.1 %",
-        run: Run::On(moved),
+        run: moved,
     },
     Case {
         id: 5,
         name: "a scene of any size",
         setup: "scaled by 2^k, k = -20 to 20: the same bits",
-        run: Run::On(scaled),
+        run: scaled,
     },
     Case {
         id: 10,
         name: "spheres of radius 1e20",
         setup: "ground and scene of radius up to 1e20, and down to 1e-20: as the f64 reference",
-        run: Run::On(extreme),
+        run: extreme,
     },
     Case {
         id: 11,
         name: "lamps buried at a point of contact",
         setup: "a lamp within an opaque sphere that it touches from inside, radius 1e-3 to 1e6, \
                 camera outside; and one behind the wall of a room: nothing of it is seen",
-        run: Run::On(buried),
+        run: buried,
     },
     Case {
         id: 12,
         name: "coincident spheres",
         setup: "every sphere of a scene twice, opaque and glass: the same bits as without",
-        run: Run::On(coincident),
+        run: coincident,
     },
     Case {
         id: 13,
         name: "thin glass shells",
         setup: "concentric spheres with gaps of 1e-2 to 1e-9 of the radius, air or denser glass \
                 inside, in a constant environment: energy, and the reference on the same paths",
-        run: Run::On(shells),
+        run: shells,
     },
     Case {
         id: 14,
         name: "nested and overlapping dielectrics",
         setup: "overlapping balls in a constant environment, seen from outside and inside, are \
                 white; an inner ball of the same index cannot be seen",
-        run: Run::On(nested),
+        run: nested,
     },
     Case {
         id: 15,
         name: "values that are no scene",
         setup: "radius 0, negative, NaN, infinite, above 1e20, a camera at its own aim: refused \
                 with the line",
-        run: Run::On(refused),
+        run: refused,
     },
 ];
 

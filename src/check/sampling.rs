@@ -4,9 +4,9 @@ use std::f64::consts::TAU;
 
 use glam::DVec3;
 
+use super::Case;
 use super::context::Context;
 use super::materials::REFLECTED;
-use super::{Case, Run};
 use crate::error::Result;
 use crate::gpu::bsdf_probe::BsdfInput;
 use crate::gpu::probe::Probe;
@@ -25,7 +25,7 @@ pub(super) const CASES: &[Case] = &[Case {
             side, and under the lecture's integrator, by chi-square; of delta lobes by how often \
             each is chosen; log p over the log of the level that Sidak leaves of 1e-3. Mirrors \
             are a delta: the direction in units of 16 ulp",
-    run: Run::On(samples),
+    run: samples,
 }];
 
 fn samples(context: &Context) -> Result<Measure> {

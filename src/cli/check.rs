@@ -133,16 +133,11 @@ fn row(report: &CaseReport, verbose: bool) -> String {
     let verdict = match report.verdict {
         Verdict::Pass => "ok",
         Verdict::Fail => "FAIL",
-        Verdict::NotApplicable => "-",
     };
     let mut text = format!("{:>4}  {verdict:<4}  {:<36}", report.id, report.name);
-    if report.verdict == Verdict::NotApplicable {
-        let _ = writeln!(text, "  {}", report.why);
-        return text;
-    }
     let failed = format!("{} of {}", report.failures, report.trials);
     let worst = report.worst.map_or("inf".into(), short);
-    let limit = report.limit.map_or(String::new(), short);
+    let limit = short(report.limit);
     let _ = writeln!(text, "{failed:>18}{worst:>10}{limit:>9}  {}", report.unit);
     if verbose {
         let _ = writeln!(text, "            {}", report.setup);
@@ -175,10 +170,9 @@ fn totals(reports: &[CaseReport], device: &AdapterSummary, options: &Options) ->
         ""
     };
     format!(
-        "\n{} passed, {} failed, {} not applicable{disturbed}, on {} ({}, {})\n",
+        "\n{} passed, {} failed{disturbed}, on {} ({}, {})\n",
         count(Verdict::Pass),
         count(Verdict::Fail),
-        count(Verdict::NotApplicable),
         device.name,
         device.backend,
         device.driver,

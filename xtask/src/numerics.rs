@@ -134,7 +134,7 @@ type Cells = BTreeMap<String, String>;
 struct Row {
     /// Name and setup.
     name: String,
-    /// The limit with its unit, or why the case is none here.
+    /// The limit with its unit.
     limit: String,
     cells: Cells,
 }
@@ -212,9 +212,7 @@ impl Table {
                 // What is known is of another case.
                 *row = new.clone();
             }
-            if case["verdict"] != "not-applicable" {
-                row.cells.insert(driver.into(), cell(case));
-            }
+            row.cells.insert(driver.into(), cell(case));
         }
         if self.arithmetic.is_empty() {
             let lines = ARITHMETIC
@@ -249,11 +247,7 @@ impl Table {
             format!("|---|---|---|{rule}"),
         ];
         for (number, Row { name, limit, cells }) in &self.cases {
-            lines.push(if limit.starts_with(NOT_APPLICABLE) {
-                format!("| {number} | {name} | {limit} |")
-            } else {
-                format!("| {number} | {name} | {limit} | {} |", all(cells))
-            });
+            lines.push(format!("| {number} | {name} | {limit} | {} |", all(cells)));
         }
         lines.push(format!("\n| arithmetic | {heads} |"));
         lines.push(format!("|---|{rule}"));
@@ -266,8 +260,6 @@ impl Table {
         lines.join("\n") + "\n"
     }
 }
-
-const NOT_APPLICABLE: &str = "not applicable: ";
 
 /// Members of the report, and what the table calls them.
 const ARITHMETIC: [(&str, &str); 10] = [
@@ -287,14 +279,9 @@ const ARITHMETIC: [(&str, &str); 10] = [
 fn row(case: &Value) -> Row {
     // A bar would end the cell.
     let text = |value: &Value| value.as_str().unwrap_or_default().replace('|', "\\|");
-    let limit = if case["verdict"] == "not-applicable" {
-        format!("{NOT_APPLICABLE}{}", text(&case["why"]))
-    } else {
-        format!("{} {}", short(&case["limit"]), text(&case["unit"]))
-    };
     Row {
         name: format!("**{}**: {}", text(&case["name"]), text(&case["setup"])),
-        limit,
+        limit: format!("{} {}", short(&case["limit"]), text(&case["unit"])),
         cells: Cells::new(),
     }
 }

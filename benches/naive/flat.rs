@@ -38,6 +38,9 @@ pub(crate) struct FlatScene {
     pub(crate) spheres: Vec<FlatSphere>,
     /// On the film at distance 1: the corner, and steps of a pixel across and down.
     pub(crate) film: [[f64; 3]; 3],
+    /// Semi-axes of the lens, zero for a pinhole, and the distance of the plane that is in focus.
+    pub(crate) lens: [[f64; 3]; 2],
+    pub(crate) focus: f64,
 }
 
 fn ior_around(scene: &Scene, index: usize) -> f64 {
@@ -66,7 +69,7 @@ impl FlatScene {
                 MaterialKind::Diffuse(m) => (Kind::Diffuse, m.albedo, 1.0),
                 MaterialKind::Mirror(m) => (Kind::Mirror, m.reflectance, 1.0),
                 MaterialKind::Dielectric(m) => (Kind::Dielectric, DVec3::ONE, m.ior),
-                other => panic!("no hazard scene has {}", other.name()),
+                other => panic!("the naive tracers do not know {}", other.name()),
             };
             FlatSphere {
                 center: sphere.center.to_array(),
@@ -101,6 +104,8 @@ impl FlatScene {
             environment: scene.environment.unwrap_or_default().to_array(),
             spheres: spheres.collect(),
             film: [forward - half, across, down].map(|v| v.to_array()),
+            lens: [right, up].map(|v| (camera.aperture_radius * v).to_array()),
+            focus: camera.focus_distance,
         }
     }
 }

@@ -1,10 +1,10 @@
-//! Host of `naive.wgsl`.
+//! Host of `kernel.wgsl`.
 
 use bytemuck::{Pod, Zeroable};
 use gpu_trace::gpu::device::{self, DeviceChoice, Gpu};
 use wgpu::util::DeviceExt as _;
 
-use crate::flat::FlatScene;
+use super::flat::FlatScene;
 
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
@@ -37,7 +37,7 @@ fn four(v: [f64; 3]) -> [f32; 4] {
 }
 
 /// The kernel with a scene.
-pub(crate) struct Naive {
+pub(crate) struct Kernel {
     gpu: Gpu,
     pipeline: wgpu::ComputePipeline,
     bind_group: wgpu::BindGroup,
@@ -47,8 +47,11 @@ pub(crate) struct Naive {
     staging: wgpu::Buffer,
 }
 
-impl Naive {
+impl Kernel {
+    /// # Panics
+    /// Without a device, and for a scene with a lens.
     pub(crate) fn new(scene: &FlatScene, max_bounces: u32) -> Self {
+        assert_eq!(scene.lens, [[0.0; 3]; 2], "the kernel has a pinhole");
         let gpu = device::open(&DeviceChoice::Best).unwrap_or_else(|e| panic!("{e}"));
         let spheres: Vec<Sphere> = scene
             .spheres
@@ -90,7 +93,7 @@ impl Naive {
         );
         let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some("naive"),
-            source: wgpu::ShaderSource::Wgsl(include_str!("naive.wgsl").into()),
+            source: wgpu::ShaderSource::Wgsl(include_str!("kernel.wgsl").into()),
         });
         let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
             label: Some("naive"),

@@ -1,14 +1,16 @@
-// The baseline: the path tracer as one writes it first. A loop over spheres in a storage buffer,
-// the textbook quadratic with a fixed epsilon, world coordinates, one path after the other. The same
-// sample stream, materials, roulette and bounce limit as the real kernel; diffuse and emission only.
+// The path tracer as a lecture writes it: f32, world coordinates, the textbook quadratic, a nudge of
+// 1e-4 along the normal, a loop over spheres in a storage buffer. What it estimates is what the real
+// kernel does by BSDF sampling: the same roulette and bounce limit.
 
 struct Sphere {
     center: vec3f,
     radius: f32,
-    albedo: vec3f,
-    unused0: f32,
+    // Albedo or reflectance.
+    color: vec3f,
+    kind: u32,
     emission: vec3f,
-    unused1: f32,
+    // Refractive index inside over outside.
+    ior: f32,
 }
 
 struct Work {
@@ -19,14 +21,18 @@ struct Work {
     position: vec3f,
     max_bounces: u32,
     corner: vec3f,
-    unused0: f32,
+    unused0: u32,
     across: vec3f,
-    unused1: f32,
+    unused1: u32,
     down: vec3f,
-    unused2: f32,
+    unused2: u32,
+    environment: vec3f,
+    unused3: u32,
 }
 
-const EPSILON: f32 = 1.0e-3;
+const NUDGE: f32 = 1.0e-4;
+const DIFFUSE: u32 = 0u;
+const MIRROR: u32 = 1u;
 
 @group(0) @binding(0) var<storage, read> spheres: array<Sphere>;
 @group(0) @binding(1) var<uniform> work: Work;
@@ -58,6 +64,7 @@ fn cosine_direction(n: vec3f, u: vec2f) -> vec3f {
     return normalize(n + vec3f(r * cos(phi), r * sin(phi), z));
 }
 
+// Distance along the ray, or -1.
 fn intersect(sphere: Sphere, origin: vec3f, direction: vec3f) -> f32 {
     let f = origin - sphere.center;
     let b = dot(f, direction);
@@ -67,25 +74,30 @@ fn intersect(sphere: Sphere, origin: vec3f, direction: vec3f) -> f32 {
         return -1.0;
     }
     let root = sqrt(discriminant);
-    if -b - root > EPSILON {
-        return -b - root;
+    return select(-b + root, -b - root, -b - root > 0.0);
+}
+
+// Share of the light that is reflected; eta: index beyond the surface over that on this side.
+fn fresnel(cos_i: f32, eta: f32) -> f32 {
+    let square = 1.0 - (1.0 - cos_i * cos_i) / (eta * eta);
+    if square <= 0.0 {
+        return 1.0;
     }
-    if -b + root > EPSILON {
-        return -b + root;
-    }
-    return -1.0;
+    let cos_t = sqrt(square);
+    let s = (cos_i - eta * cos_t) / (cos_i + eta * cos_t);
+    let p = (eta * cos_i - cos_t) / (eta * cos_i + cos_t);
+    return 0.5 * (s * s + p * p);
 }
 
 fn trace(pixel: vec2u, sample: u32) -> vec4f {
-    let u = random4(pixel, sample, 0u);
-    let place = vec2f(pixel) + u.xy;
+    let place = vec2f(pixel) + random4(pixel, sample, 0u).xy;
     var origin = work.position;
     var direction = normalize(work.corner + place.x * work.across + place.y * work.down);
     var throughput = vec3f(1.0);
+    // What refraction has taken out of the throughput: roulette must not see it.
+    var compression = 1.0;
     var radiance = vec3f(0.0);
-    var rays = 0.0;
     for (var bounce = 0u; bounce <= work.max_bounces; bounce++) {
-        rays += 1.0;
         var nearest = 1.0e30;
         var index = -1;
         for (var i = 0u; i < arrayLength(&spheres); i++) {
@@ -96,6 +108,7 @@ fn trace(pixel: vec2u, sample: u32) -> vec4f {
             }
         }
         if index < 0 {
+            radiance += throughput * work.environment;
             break;
         }
         let sphere = spheres[index];
@@ -103,18 +116,39 @@ fn trace(pixel: vec2u, sample: u32) -> vec4f {
         if bounce == work.max_bounces {
             break;
         }
-        let v = random4(pixel, sample, bounce + 1u);
-        throughput *= sphere.albedo;
-        let survival = min(4.0 * max(max(throughput.x, throughput.y), throughput.z), 1.0);
-        if v.w >= survival {
+        let u = random4(pixel, sample, bounce + 1u);
+        let point = origin + nearest * direction;
+        let outward = normalize(point - sphere.center);
+        let inside = dot(outward, direction) > 0.0;
+        // On the side of arrival.
+        let normal = select(outward, -outward, inside);
+        var side = 1.0;
+        if sphere.kind == DIFFUSE {
+            direction = cosine_direction(normal, u.xy);
+            throughput *= sphere.color;
+        } else if sphere.kind == MIRROR {
+            direction = normalize(reflect(direction, normal));
+            throughput *= sphere.color;
+        } else {
+            let eta = select(sphere.ior, 1.0 / sphere.ior, inside);
+            if u.z < fresnel(-dot(normal, direction), eta) {
+                direction = normalize(reflect(direction, normal));
+            } else {
+                direction = normalize(refract(direction, normal, 1.0 / eta));
+                throughput /= eta * eta;
+                compression *= eta * eta;
+                side = -1.0;
+            }
+        }
+        let largest = compression * max(max(throughput.x, throughput.y), throughput.z);
+        let survival = min(4.0 * largest, 1.0);
+        if largest <= 0.0 || u.w >= survival {
             break;
         }
         throughput /= survival;
-        origin += nearest * direction;
-        let normal = normalize(origin - sphere.center);
-        direction = cosine_direction(select(normal, -normal, dot(normal, direction) > 0.0), v.xy);
+        origin = point + side * NUDGE * normal;
     }
-    return vec4f(radiance, rays);
+    return vec4f(radiance, 1.0);
 }
 
 @compute @workgroup_size(8, 8)
@@ -126,5 +160,5 @@ fn render(@builtin(global_invocation_id) id: vec3u) {
     for (var sample = work.first_sample; sample < work.end_sample; sample++) {
         sum += trace(id.xy, sample);
     }
-    sums[id.y * work.size.x + id.x] += sum;
+    sums[id.y * work.size.x + id.x] = sum;
 }
