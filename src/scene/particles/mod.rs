@@ -207,7 +207,9 @@ pub fn gather(request: &Request) -> Result<Cloud, Fault> {
             return Err(Fault::new("radius", message)
                 .help("`select` can leave particles out: `select = \"radius > 0\"`"));
         }
-        if !(center.abs().max_element() <= MAX_MAGNITUDE) {
+        // Also what is no number.
+        let inside = center.is_finite() && center.abs().max_element() <= MAX_MAGNITUDE;
+        if !inside {
             let message = format!(
                 "particle {} is at {center}, beyond {MAX_MAGNITUDE:e}",
                 index + 1
