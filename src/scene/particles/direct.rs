@@ -243,3 +243,84 @@ fn camera(balls: &[Ball]) -> Camera {
         focus_distance: distance,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::verify::Random;
+
+    /// The largest share of a half of the picture that a ball reaches to, in the directions up and across; 1
+    /// is the edge.
+    fn reach(camera: &Camera, balls: &[Ball]) -> f64 {
+        let [forward, right, up] = axes(camera.position, camera.look_at, camera.up);
+        let half = (0.5 * FOV).to_radians();
+        let aspect = f64::from(SIZE[0]) / f64::from(SIZE[1]);
+        let of = |ball: &Ball| {
+            let x = ball.center - camera.position;
+            let share = |axis: DVec3, edge: f64| {
+                let (z, y) = (x.dot(forward), x.dot(axis).abs());
+                // The far side's tangent through the camera, in the plane of both axes.
+                let angle = y.atan2(z) + (ball.radius / z.hypot(y)).asin();
+                angle.tan() / edge
+            };
+            share(right, half.tan() * aspect).max(share(up, half.tan()))
+        };
+        balls.iter().map(of).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn all_is_in_the_picture_and_fills_it() {
+        let mut random = Random::new("particles in the picture");
+        for shape in [
+            [1.0, 1.0, 1.0],
+            [10.0, 1.0, 3.0],
+            [0.1, 5.0, 5.0],
+            [0.0, 0.0, 1e6],
+        ] {
+            for offset in [0.0, 1e5] {
+                let mut ball = || {
+                    let [x, y, z, r] = random.unit4().map(f64::from);
+                    Ball {
+                        center: DVec3::new(x, y, z) * DVec3::from(shape) + offset,
+                        radius: 0.01 + 0.2 * r,
+                        color: 0,
+                    }
+                };
+                let balls: Vec<Ball> = (0..50).map(|_| ball()).collect();
+                let camera = camera(&balls);
+                let reach_of = |camera: &Camera| reach(camera, &balls);
+                let there = reach_of(&camera);
+                assert!((0.9..1.0).contains(&there), "{shape:?}: {there}");
+                // Companion: from a tenth nearer not all is.
+                let mut near = camera.clone();
+                near.position = near.position.lerp(near.look_at, 0.1);
+                assert!(reach_of(&near) > 1.0, "{shape:?}: {}", reach_of(&near));
+            }
+        }
+    }
+
+    #[test]
+    fn the_lamp_is_not_seen() {
+        let ball = Ball {
+            center: DVec3::ZERO,
+            radius: 1.0,
+            color: 0,
+        };
+        let cloud = Cloud {
+            balls: vec![ball],
+            colors: Vec::new(),
+        };
+        let scene = scene(cloud, BACKGROUND);
+        let lamp = scene.spheres.last().expect("a lamp");
+        let lamp = Ball {
+            center: lamp.center,
+            radius: lamp.radius,
+            color: 0,
+        };
+        let [forward, ..] = axes(scene.camera.position, scene.camera.look_at, scene.camera.up);
+        let x = lamp.center - scene.camera.position;
+        let angle = x.angle_between(forward) - (lamp.radius / x.length()).asin();
+        // The corners are at most 20 degrees off the axis.
+        assert!(angle > 20f64.to_radians(), "{}", angle.to_degrees());
+    }
+}
