@@ -132,10 +132,10 @@ fn outputs_are_refused_before_any_work() {
     }
     holds(&folder.refused(&["good.toml", "-o", ""]), &["--output"]);
     // A scene need not be called .toml; the output may well be.
-    folder.write("scene.npy", GOOD);
+    folder.write("scene.exr", GOOD);
     holds(
-        &folder.refused(&["scene.npy", "-o", "scene.npy"]),
-        &["'scene.npy'", "would replace the input"],
+        &folder.refused(&["scene.exr", "-o", "scene.exr"]),
+        &["'scene.exr'", "would replace the input"],
     );
 }
 
