@@ -42,6 +42,7 @@ pub mod job;
 pub mod ledger;
 pub mod materials;
 pub mod numbers;
+mod numpy;
 pub mod output;
 pub mod particles;
 pub mod placement;

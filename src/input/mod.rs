@@ -142,13 +142,13 @@ fn check_size(
     )))
 }
 
-fn invalid(text: impl Into<String>) -> io::Error {
+pub(crate) fn invalid(text: impl Into<String>) -> io::Error {
     io::Error::new(io::ErrorKind::InvalidData, text.into())
 }
 
 /// A part of a file as a message may show it: what is corrupt can be long and hold control
 /// characters.
-fn shown(text: &str) -> String {
+pub(crate) fn shown(text: &str) -> String {
     let visible = |c: char| match c {
         '\'' | '"' => vec![c],
         _ => c.escape_debug().collect(),
