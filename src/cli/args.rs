@@ -284,6 +284,7 @@ pub struct RenderArgs {
         value_name = "R,G,B",
         help_heading = "Particle files",
         value_parser = values::background,
+        allow_hyphen_values = true,
         help = "Radiance of the background, and of the light from all around: white, black or R,G,B [default: white]"
     )]
     pub background: Option<DVec3>,
