@@ -131,7 +131,10 @@ fn node(items: &mut [Item], level: u32, options: Options) -> Node {
         (extent, node(items, level + 1, options))
     };
     Node::Inner(if many {
-        parts.into_par_iter().map(|(_, items)| part(items)).collect()
+        parts
+            .into_par_iter()
+            .map(|(_, items)| part(items))
+            .collect()
     } else {
         parts.into_iter().map(|(_, items)| part(items)).collect()
     })
@@ -146,9 +149,8 @@ fn bounds_of(items: &[Item]) -> Bounds {
 fn extent(items: &[Item], options: Options) -> Extent {
     let bounds = bounds_of(items);
     let center = (0.5 * (bounds.low.as_dvec3() + bounds.high.as_dvec3())).as_vec3();
-    let reach = |item: &Item| {
-        (item.center.as_dvec3() - center.as_dvec3()).abs() + f64::from(item.radius)
-    };
+    let reach =
+        |item: &Item| (item.center.as_dvec3() - center.as_dvec3()).abs() + f64::from(item.radius);
     let half = items.iter().map(reach).fold(DVec3::ZERO, DVec3::max) * options.scale;
     let half = half + options.slack * half.max_element();
     Extent {
@@ -160,7 +162,11 @@ fn extent(items: &[Item], options: Options) -> Extent {
 /// The least f32 that is not less than `x`, positive.
 fn up(x: f64) -> f32 {
     let near = x as f32;
-    if f64::from(near) < x { near.next_up() } else { near }
+    if f64::from(near) < x {
+        near.next_up()
+    } else {
+        near
+    }
 }
 
 /// Sorts the items into two parts that cost least by the heuristic, leaves being what costs; returns where the second
@@ -230,7 +236,10 @@ fn partition(items: &mut [Item], first: impl Fn(&Item) -> bool) -> usize {
 
 /// Sorts the items into two halves by their places along the widest axis, or where these are all the same by radius.
 fn halve(items: &mut [Item]) -> usize {
-    let mut low = items[0].center.as_dvec3().extend(f64::from(items[0].radius));
+    let mut low = items[0]
+        .center
+        .as_dvec3()
+        .extend(f64::from(items[0].radius));
     let mut high = low;
     for item in items.iter() {
         let place = item.center.as_dvec3().extend(f64::from(item.radius));
@@ -239,7 +248,11 @@ fn halve(items: &mut [Item]) -> usize {
     let axis = (high - low).max_position();
     let key = |item: &Item| item.center.extend(item.radius)[axis];
     let half = (items.len() / 2).next_multiple_of(WIDE);
-    let half = if half < items.len() { half } else { items.len() / 2 };
+    let half = if half < items.len() {
+        half
+    } else {
+        items.len() / 2
+    };
     items.select_nth_unstable_by(half, |a, b| {
         key(a).total_cmp(&key(b)).then(a.index.cmp(&b.index))
     });

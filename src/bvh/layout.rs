@@ -56,7 +56,8 @@ impl<'a> Writer<'a> {
         self.texels.push(whole.map(|ball| self.first + ball));
         for (place, ball) in (at + 1..).zip(whole) {
             let Ball { center, radius, .. } = self.balls[ball as usize];
-            self.texels.push(center.extend(radius).to_array().map(f32::to_bits));
+            self.texels
+                .push(center.extend(radius).to_array().map(f32::to_bits));
             self.places[ball as usize] = place;
         }
         at | LEAF

@@ -17,6 +17,7 @@ mod materials;
 mod placing;
 mod sampled;
 mod sampling;
+mod tree;
 
 pub use crate::verify::Measure;
 pub use context::Context;
@@ -62,7 +63,7 @@ pub enum Run {
 /// All cases, by number.
 #[must_use]
 pub fn cases() -> Vec<Case> {
-    let groups: [&[Case]; 8] = [
+    let groups: [&[Case]; 9] = [
         intersection::CASES,
         placing::CASES,
         lights::CASES,
@@ -71,6 +72,7 @@ pub fn cases() -> Vec<Case> {
         sampling::CASES,
         integrator::CASES,
         film::CASES,
+        tree::CASES,
     ];
     let mut all = groups.concat();
     all.sort_by_key(|case| case.id);

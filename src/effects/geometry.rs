@@ -5,12 +5,9 @@ use super::{Effect, Row, when};
 use crate::placement::Side;
 use crate::settings::{GeometryChoice, Offset};
 
-/// Spheres up to which they are baked into the kernel as constants: measured, see
-/// `benches/RESULTS.md`.
+/// Spheres up to which they are baked into the kernel as constants, and beyond which a tree is faster than a loop
+/// over all: measured, see `benches/RESULTS.md`.
 pub const BAKED_LIMIT: usize = 64;
-
-/// Spheres up to which a loop over all is no slower than a tree: measured, see `benches/RESULTS.md`.
-pub const LIST_LIMIT: usize = 64;
 
 /// Most spheres that can be baked at all: beyond, compiling takes minutes.
 pub const BAKED_MOST: usize = 256;
@@ -163,10 +160,10 @@ pub(super) fn rows() -> Vec<Row> {
 
 /// The form of the geometry that `auto` takes for so many spheres.
 fn automatic(count: usize) -> Effect {
-    match count {
-        0..=BAKED_LIMIT => Effect::Baked,
-        ..=LIST_LIMIT => Effect::List,
-        _ => Effect::Bvh,
+    if count <= BAKED_LIMIT {
+        Effect::Baked
+    } else {
+        Effect::Bvh
     }
 }
 
@@ -182,9 +179,9 @@ fn form(effect: Effect, name: &'static str, what: &'static str) -> Row {
             GeometryChoice::Bvh => Effect::Bvh,
         };
         when(chosen == effect, || match choice {
-            GeometryChoice::Auto => format!(
-                "{count} spheres; baked up to {BAKED_LIMIT}, list up to {LIST_LIMIT}, bvh beyond"
-            ),
+            GeometryChoice::Auto => {
+                format!("{count} spheres; baked up to {BAKED_LIMIT}, bvh beyond")
+            }
             _ => format!("--geometry {}", choice.name()),
         })
     })

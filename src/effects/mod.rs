@@ -22,7 +22,7 @@ use crate::placement::{PlacedSphere, Placement};
 use crate::scene::{Material, Scene};
 use crate::settings::Settings;
 
-pub use geometry::{BAKED_LIMIT, BAKED_MOST, LIST_LIMIT};
+pub use geometry::{BAKED_LIMIT, BAKED_MOST};
 pub use role::Role;
 
 /// An effect: something that a kernel can have or not.

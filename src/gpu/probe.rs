@@ -8,8 +8,8 @@ use bytemuck::{Pod, Zeroable};
 
 use crate::effects::Effects;
 use crate::error::{Error, Result};
-use crate::gpu::device::Gpu;
 use crate::gpu::data::SceneBytes;
+use crate::gpu::device::Gpu;
 use crate::gpu::engine::{Engine, Program, Recording};
 use crate::gpu::layout::CameraRecord;
 use crate::placement::Placement;

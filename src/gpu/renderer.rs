@@ -137,6 +137,14 @@ impl GpuRenderer {
         self
     }
 
+    /// The same renderer whose invocations start no further path after so many loop iterations, whatever the driver
+    /// stands: for tests of what happens then.
+    #[must_use]
+    pub fn with_step_limit(mut self, steps: u32) -> Self {
+        self.step_limit = steps;
+        self
+    }
+
     /// The kernel in use.
     #[must_use]
     pub fn kernel(&self) -> &Kernel {

@@ -158,7 +158,15 @@ impl Placement {
     /// Those that paths are always in are beside it.
     #[must_use]
     pub fn tree(&self) -> &Tree {
-        self.tree.get_or_init(|| Tree::new(&self.balls(), self.poles as u32))
+        self.tree
+            .get_or_init(|| Tree::new(&self.balls(), self.poles as u32))
+    }
+
+    /// The same with another tree, for tests of one that is made wrongly.
+    #[must_use]
+    pub fn with_tree(mut self, tree: Tree) -> Self {
+        self.tree = OnceLock::from(tree);
+        self
     }
 
     /// What is in the tree, or beside it.
