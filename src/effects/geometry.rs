@@ -25,9 +25,9 @@ pub(super) fn rows() -> Vec<Row> {
         .marks(["FIRST_CENTERED", "spheres", "nearer_sphere"]),
         form(Effect::Bvh, "bvh", "a tree over spheres in a texture").marks([
             "tree",
-            "texel",
+            "data::texel",
             "sphere_at",
-            "place",
+            "Attributes::place",
             "TREE_ROOT",
             "TREE_STACK",
             "TREE_APART",

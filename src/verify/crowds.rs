@@ -117,6 +117,10 @@ impl Crowd {
             let d = point(random);
             return vec![rows(Vec3::ZERO, None, DVec3::ZERO, d, None)];
         }
+        // Squares of its products with what a sphere is made of have to be numbers of f32.
+        let extent = |(center, radius): &(Vec3, f32)| f64::from(center.length() + radius);
+        let extent = self.balls.iter().map(extent).fold(1.0, f64::max);
+        let longest = (17.0 - extent.log10()).min(15.0);
         let kinds = if within { 8 } else { 6 };
         (0..count)
             .map(|i| {
@@ -191,16 +195,16 @@ impl Crowd {
                         rows(center.as_vec3(), Some(from), offset, d, Some(from))
                     }
                 };
-                scaled(ray, random)
+                scaled(ray, longest, random)
             })
             .collect()
     }
 }
 
 /// One in four with a direction of another length.
-fn scaled(mut ray: RayRows, random: &mut Random) -> RayRows {
+fn scaled(mut ray: RayRows, longest: f64, random: &mut Random) -> RayRows {
     if random.unit() < 0.25 {
-        let length = random.magnitude(-15.0, 15.0) as f32;
+        let length = random.magnitude(-15.0, longest) as f32;
         for axis in &mut ray[2][..3] {
             *axis *= length;
         }
