@@ -7,6 +7,7 @@
 mod loading;
 mod naive;
 mod offsets;
+mod trees;
 
 use std::time::Instant;
 
@@ -43,6 +44,9 @@ fn main() {
     }
     if chosen("geometry") {
         geometry_forms();
+    }
+    if chosen("trees") {
+        trees::run();
     }
     if chosen("offsets") {
         offsets::run();

@@ -38,7 +38,7 @@ fn run(context: &Context) -> Result<Measure> {
         (Side::Outside, &["diffuse"][..]),
         (Side::Tracked, &["diffuse", "interior", "dielectric"]),
     ] {
-        for crowd in crowds(context.size(300, 3000)) {
+        for crowd in crowds(context.size(300, 1000)) {
             let empty = Placement::new(&scene, scene.width, scene.height);
             let mut placement = crowd.placed(empty, side);
             if context.options.disturb {
@@ -49,7 +49,7 @@ fn run(context: &Context) -> Result<Measure> {
                 let tree = Tree::with(&placement.balls(), 0, smaller);
                 placement = placement.with_tree(tree);
             }
-            let count = context.size(4096, 65_536);
+            let count = context.size(4096, 32_768);
             let rays = crowd.rays(&mut random, count, side == Side::Tracked);
             let [list, tree] = [["list"], ["bvh"]].map(|form| -> Result<Vec<Answer>> {
                 let effects = Effects::named(&[effects, &form].concat());
