@@ -8,6 +8,7 @@ mod loading;
 #[expect(dead_code, reason = "f64 is for `hazards` and the tests")]
 mod naive;
 mod offsets;
+mod trees;
 
 use std::time::Instant;
 
@@ -46,6 +47,9 @@ fn main() {
     }
     if chosen("geometry") {
         geometry_forms();
+    }
+    if chosen("trees") {
+        trees::run();
     }
     if chosen("offsets") {
         offsets::run();

@@ -175,7 +175,7 @@ fn check_geometry(scene: &Scene, settings: &Settings) -> Result<()> {
     if settings.geometry == GeometryChoice::Baked && scene.spheres.len() > BAKED_MOST {
         return usage(format!(
             "--geometry baked takes up to {BAKED_MOST} spheres, the scene has {}: leave it to \
-             auto, or use list",
+             auto, or use list or bvh",
             scene.spheres.len()
         ));
     }

@@ -8,6 +8,7 @@
 //! 3. [`scene`]: the scene file, validated.
 //! 4. [`placement`]: where everything is, in f64, relative to where the picture is; what lies in what, which of
 //!    several dielectrics fills the space, what light sampling chooses from.
+//!    [`bvh`]: a tree over many spheres.
 //! 5. [`effects`]: what the scene asks for; nothing else goes into the kernel.
 //!    [`job`]: all of these, checked: renderers are made of jobs only. [`claims`]: what its estimator claims.
 //! 6. [`shader`]: the kernel, linked for these effects from `shaders/`.
@@ -27,6 +28,7 @@
 //! [`numbers`] is how people read them. [`error`] is what can go wrong anywhere.
 
 pub mod backend;
+pub mod bvh;
 pub mod check;
 pub mod claims;
 pub mod cli;

@@ -217,13 +217,15 @@ pub enum GeometryChoice {
     Auto,
     /// Spheres as constants in the kernel.
     Baked,
-    /// A loop over storage buffers.
+    /// A loop over a storage buffer.
     List,
+    /// A tree.
+    Bvh,
 }
 
 impl GeometryChoice {
     /// All of them.
-    pub const ALL: &'static [Self] = &[Self::Auto, Self::Baked, Self::List];
+    pub const ALL: &'static [Self] = &[Self::Auto, Self::Baked, Self::List, Self::Bvh];
 
     /// The name on the command line.
     #[must_use]
@@ -232,6 +234,7 @@ impl GeometryChoice {
             Self::Auto => "auto",
             Self::Baked => "baked",
             Self::List => "list",
+            Self::Bvh => "bvh",
         }
     }
 }

@@ -188,7 +188,11 @@ fn of_coincident_spheres_the_first_wins() {
     for copy in &mut twice.spheres[3..] {
         copy.material = 1 - copy.material;
     }
-    for geometry in [GeometryChoice::Baked, GeometryChoice::List] {
+    for geometry in [
+        GeometryChoice::Baked,
+        GeometryChoice::List,
+        GeometryChoice::Bvh,
+    ] {
         let settings = Settings {
             geometry,
             ..settings(&alone, 48, 48, 16)

@@ -444,6 +444,7 @@ fn devices_geometries_and_threads_agree() {
         ("--backend gpu", "backend", "gpu"),
         ("--geometry list", "geometry", "list"),
         ("--geometry baked", "geometry", "baked"),
+        ("--geometry bvh", "geometry", "bvh"),
         ("--device 0", "backend", "gpu"),
         (&format!("--device {word}"), "backend", "gpu"),
         ("--backend cpu", "backend", "cpu"),

@@ -26,6 +26,7 @@ fn the_kernel_holds_what_the_scene_asks_for() {
         "field",
         "good.toml",
         "good.toml --geometry list",
+        "good.toml --geometry bvh",
     ] {
         // The kernel holds the camera, whose constants follow from the size.
         let scene = &format!("{scene} --size 2x2");

@@ -79,7 +79,7 @@ fn options_are_refused_with_their_name_and_the_way_out() {
         --sampler random | --sampler | sobol, independent
         --roulette maybe | --roulette | on, off
         --backend tpu | --backend | auto, gpu, cpu
-        --geometry grid | --geometry | auto, baked, list
+        --geometry grid | --geometry | auto, baked, list, bvh
         --progress loud | --progress | auto, plain, json, none
         --spp 4 --sample-range 0..4 | --spp | --sample-range
         -q -v | --quiet | --verbose

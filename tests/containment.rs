@@ -103,7 +103,11 @@ fn glass_is_not_hidden_by_glass_and_fills_rooms() {
 
 /// A furnace is white, whatever glass is in it, on both backends and in both geometry forms.
 fn is_white(name: &str, scene: &Scene) {
-    for geometry in [GeometryChoice::Baked, GeometryChoice::List] {
+    for geometry in [
+        GeometryChoice::Baked,
+        GeometryChoice::List,
+        GeometryChoice::Bvh,
+    ] {
         let settings = Settings {
             geometry,
             max_bounces: 4000,

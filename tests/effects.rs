@@ -50,7 +50,7 @@ fn completed(set: impl IntoIterator<Item = Effect>) -> Option<Set> {
         // What scenes here have within glass, and through a lens.
         set.insert(opaque);
     }
-    if !set.contains(&Effect::List) {
+    if ![Effect::List, Effect::Bvh].iter().any(|e| set.contains(e)) {
         set.insert(Effect::Baked);
     }
     loop {
@@ -194,9 +194,10 @@ fn asking_for(set: &Set) -> (Scene, Settings) {
         spheres,
     };
     let settings = Settings {
-        geometry: match has(Effect::List) {
-            true => GeometryChoice::List,
-            false => GeometryChoice::Baked,
+        geometry: match [Effect::List, Effect::Bvh].map(has) {
+            [true, _] => GeometryChoice::List,
+            [_, true] => GeometryChoice::Bvh,
+            _ => GeometryChoice::Baked,
         },
         integrator: match [Effect::Lecture, Effect::Mis, Effect::Lights].map(has) {
             [true, ..] => Integrator::Lecture { termination: 0.2 },
@@ -335,8 +336,9 @@ fn check(sets: &BTreeSet<Set>) -> Vec<(Set, Linked)> {
 
 fn singles() -> BTreeSet<Set> {
     let alone = every().filter_map(|effect| completed([effect]));
-    let list = every().filter_map(|effect| completed([effect, Effect::List]));
-    alone.chain(list).collect()
+    let forms = [Effect::List, Effect::Bvh];
+    let stored = forms.map(|form| every().filter_map(move |effect| completed([effect, form])));
+    alone.chain(stored.into_iter().flatten()).collect()
 }
 
 fn pairs() -> BTreeSet<Set> {
@@ -413,10 +415,10 @@ fn a_sample_of_the_rest() {
 
 #[test]
 fn every_set_in_the_scenes() {
-    // As they are, and with the other geometry and integrator.
+    // As they are, and with the other geometries and integrator.
     let jobs: Vec<_> = scene_files()
         .into_iter()
-        .flat_map(|path| (0..4).map(move |variant| (path.clone(), variant)))
+        .flat_map(|path| (0..5).map(move |variant| (path.clone(), variant)))
         .collect();
     let faults: Vec<String> = jobs
         .par_iter()
@@ -427,6 +429,7 @@ fn every_set_in_the_scenes() {
                 1 => settings.geometry = GeometryChoice::List,
                 2 => settings.integrator = Integrator::Lecture { termination: 0.2 },
                 3 => settings.roulette = false,
+                4 => settings.geometry = GeometryChoice::Bvh,
                 _ => {}
             }
             let placement = Placement::new(&scene, settings.width, settings.height);

@@ -81,7 +81,11 @@ fn a_closed_furnace_cut_early_is_the_partial_sum() {
 #[test]
 fn a_lossless_closed_furnace_stops_at_the_limit() {
     let scene = closed(1.0, 1.0);
-    for geometry in [GeometryChoice::Baked, GeometryChoice::List] {
+    for geometry in [
+        GeometryChoice::Baked,
+        GeometryChoice::List,
+        GeometryChoice::Bvh,
+    ] {
         let settings = Settings {
             geometry,
             ..settings(&scene, 16, 16, 16)
@@ -98,7 +102,11 @@ fn a_lossless_closed_furnace_stops_at_the_limit() {
 fn paths_of_any_length_are_whole() {
     // 16 samples of 10001 rays are beyond what some drivers let a loop do: dispatches are resumed.
     let scene = closed(1.0, 1.0);
-    for geometry in [GeometryChoice::Baked, GeometryChoice::List] {
+    for geometry in [
+        GeometryChoice::Baked,
+        GeometryChoice::List,
+        GeometryChoice::Bvh,
+    ] {
         let settings = Settings {
             geometry,
             max_bounces: 10_000,

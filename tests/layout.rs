@@ -156,8 +156,11 @@ fn glsl_has_the_same_layouts() {
             assert_eq!(faults, [""; 0], "{stage:?} of {names:?}");
         }
     }
-    // With lights in the scene's data.
-    assert_eq!(other_in_glsl(&kernel(Stage::Path, &FULL).module), [""; 0]);
+    // With lights in the scene's data, and with a tree.
+    let tree = FULL.map(|name| if name == "list" { "bvh" } else { name });
+    for names in [FULL, tree] {
+        assert_eq!(other_in_glsl(&kernel(Stage::Path, &names).module), [""; 0]);
+    }
 }
 
 #[test]
@@ -430,6 +433,10 @@ fn attributes_agree() {
             &["list", "diffuse", "interior"],
             vec![("material", 0), ("side", 4)],
         ),
+        (
+            &["bvh", "diffuse", "interior"],
+            vec![("material", 0), ("side", 4), ("place", 8)],
+        ),
     ] {
         let (members, size) = device(&kernel(Stage::Path, names), "Attributes");
         let members: Vec<(&str, u32)> = members.iter().map(|(n, o)| (n.as_str(), *o)).collect();
@@ -464,6 +471,11 @@ fn the_scenes_data_agree() {
         (members.len(), size),
         (expected.len(), end.next_multiple_of(16))
     );
+    // Those of a tree are in its texture.
+    let tree = FULL.map(|name| if name == "list" { "bvh" } else { name });
+    let (members, _) = device(&self::kernel(Stage::Path, &tree), "SceneData");
+    let names: Vec<&str> = members.iter().map(|(name, _)| name.as_str()).collect();
+    assert_eq!(names, ["poles", "attributes", "materials", "lights"]);
     // Without lights, poles and spheres in a list there is nothing to read.
     let baked = self::kernel(Stage::Path, &["baked", "diffuse"]);
     assert_eq!(baked.struct_members("SceneData"), None);

@@ -5,15 +5,19 @@
 mod common;
 
 use std::cell::RefCell;
+use std::collections::BTreeSet;
 use std::ops::Range;
 use std::time::Duration;
 
 use common::{gpu_renderer, job, render_cpu, render_gpu, scene, scene_file, scene_files};
+use glam::DVec3;
 use gpu_trace::effects::{Effect, Effects};
 use gpu_trace::error::{Error, Result};
 use gpu_trace::film::{Film, PixelSums, Tally, Tiles, Window};
 use gpu_trace::gpu::device::STORAGE_BUFFERS;
 use gpu_trace::gpu::renderer::DispatchLimits;
+use gpu_trace::materials::MaterialKind;
+use gpu_trace::materials::diffuse::Diffuse;
 use gpu_trace::placement::Placement;
 use gpu_trace::render::{Control, Renderer, Status, StoppedBy, Watch, render, render_quietly};
 use gpu_trace::sampler::Sampler;
@@ -21,7 +25,7 @@ use gpu_trace::scene::Scene;
 use gpu_trace::settings::{GeometryChoice, Integrator, LightSampling, Rect, Settings};
 use gpu_trace::shader::steps::{LOOPS, vertex_steps};
 use gpu_trace::shader::{Kernel, Stage, link};
-use gpu_trace::verify::{Random, means, settings};
+use gpu_trace::verify::{Random, image_bits, means, settings};
 
 /// A closed furnace that keeps all light.
 const FURNACE: &str = "
@@ -44,7 +48,7 @@ const FURNACE: &str = "
 
 /// Many spheres in a cube under a sky.
 fn cloud(count: u32) -> String {
-    let mut random = gpu_trace::verify::Random::new("cloud");
+    let mut random = Random::new("cloud");
     let mut text = String::from(
         "
         [camera]
@@ -88,7 +92,10 @@ fn more_bounces_than_a_loop_may_have_in_one_dispatch() {
 #[test]
 fn more_spheres_than_a_loop_may_visit_in_one_dispatch() {
     let scene = scene(&cloud(5000));
-    let many = settings(&scene, 16, 16, 32);
+    let many = Settings {
+        geometry: GeometryChoice::List,
+        ..settings(&scene, 16, 16, 32)
+    };
     // The same paths but for rounding at silhouettes, where some 20 of the 8192 part: a difference with a
     // standard deviation of sqrt(20) times half the radiance, 7e-4 of the sum, and four of these.
     let (gpu, cpu) = (
@@ -114,10 +121,8 @@ fn a_path_longer_than_any_dispatch_is_an_error_or_right() {
     }
 }
 
-/// A driver that ends the loop over spheres within a path makes it miss the wall behind them, which is the
-/// last of the list: what it saw until then is no sample.
-#[test]
-fn a_path_within_which_a_loop_ends_is_an_error_or_right() {
+/// A furnace with many small lamps in it, which look as its wall does.
+fn crowded_furnace() -> Scene {
     let mut random = Random::new("crowd");
     let (head, wall) = FURNACE.split_once("[[sphere]]").expect("one sphere");
     let mut text = head.to_owned();
@@ -128,20 +133,76 @@ fn a_path_within_which_a_loop_ends_is_an_error_or_right() {
             d.x, d.y, d.z
         );
     }
-    let scene = scene(&format!("{text}[[sphere]]{wall}"));
-    let endless = Settings {
+    scene(&format!("{text}[[sphere]]{wall}"))
+}
+
+/// A driver that ends the loop over spheres within a path makes it miss the wall behind them, which is the
+/// last of the list: what it saw until then is no sample.
+#[test]
+fn a_path_within_which_a_loop_ends_is_an_error_or_right() {
+    let scene = crowded_furnace();
+    let endless = |geometry| Settings {
         max_bounces: 1000,
         integrator: Integrator::Bsdf,
+        geometry,
         ..settings(&scene, 2, 1, 1)
     };
-    for seed in 1..=8 {
-        let mut renderer = gpu_renderer(&scene, &endless).with_seed(seed);
-        match render_quietly(&mut renderer, &endless) {
+    // By the tree the path may fit.
+    let forms = [GeometryChoice::List, GeometryChoice::Bvh].map(endless);
+    for (endless, seed) in forms
+        .iter()
+        .flat_map(|s| (1..=8).map(move |seed| (s, seed)))
+    {
+        let mut renderer = gpu_renderer(&scene, endless).with_seed(seed);
+        match render_quietly(&mut renderer, endless) {
             // A driver without such a limit.
             Ok(outcome) => assert_eq!(means(&outcome.film), [1001.0; 6], "seed {seed}"),
             Err(Error::Gpu(text)) => assert!(text.contains("--max-bounces"), "{text}"),
             Err(other) => panic!("{other}"),
         }
+    }
+}
+
+/// In a tree an invocation does not know how many iterations the driver has counted: it goes on until loops end. The
+/// path that this happens to is no sample, and begun again; rays are counted once.
+#[test]
+fn paths_in_a_tree_go_on_in_the_next_dispatch() {
+    let scene = crowded_furnace();
+    let mut crowd = scene.clone();
+    // Ways through the tree differ from pixel to pixel, and paths end at once or late.
+    crowd.materials[0].kind = MaterialKind::Diffuse(Diffuse {
+        albedo: DVec3::splat(0.9),
+    });
+    for (scene, max_bounces, whole) in [(scene, 150, true), (crowd, 64, false)] {
+        let settings = Settings {
+            max_bounces,
+            integrator: Integrator::Bsdf,
+            geometry: GeometryChoice::Bvh,
+            ..settings(&scene, 16, 16, 64)
+        };
+        let film = |steps: Option<u32>, seed| {
+            let renderer = gpu_renderer(&scene, &settings).with_seed(seed);
+            let mut renderer = match steps {
+                Some(steps) => renderer.with_step_limit(steps),
+                None => renderer,
+            };
+            let outcome = render_quietly(&mut renderer, &settings);
+            outcome.unwrap_or_else(|e| panic!("{e}")).film
+        };
+        let usual = film(None, 0);
+        if whole {
+            assert_eq!(means(&usual), vec![151.0; 3 * 256]);
+            assert_eq!(usual.tally().rays, 151 * 256 * 64);
+        }
+        for steps in [1, u32::MAX] {
+            let other = film(Some(steps), 0);
+            assert_eq!(image_bits(&other), image_bits(&usual), "{steps}");
+            assert_eq!(other.tally(), usual.tally(), "{steps}");
+        }
+        // Companion: other samples.
+        let other = film(None, 1);
+        assert_eq!(image_bits(&other) == image_bits(&usual), whole);
+        assert_eq!(other.tally() == usual.tally(), whole);
     }
 }
 
@@ -296,7 +357,7 @@ fn kernel(scene: &Scene, settings: &Settings) -> (Kernel, Placement, Effects) {
     (kernel, placement, effects)
 }
 
-/// The kernels of every scene: with as few and with as many effects as settings can bring, in both forms.
+/// The kernels of every scene: with as few and with as many effects as settings can bring, in all forms.
 fn kernels(scene: &Scene) -> Vec<(Kernel, Placement, Effects)> {
     let few = Settings {
         integrator: Integrator::Lecture { termination: 0.2 },
@@ -315,7 +376,11 @@ fn kernels(scene: &Scene) -> Vec<(Kernel, Placement, Effects)> {
     };
     let mut all = Vec::new();
     for settings in [few, many, table] {
-        for geometry in [GeometryChoice::Auto, GeometryChoice::List] {
+        for geometry in [
+            GeometryChoice::Auto,
+            GeometryChoice::List,
+            GeometryChoice::Bvh,
+        ] {
             let settings = Settings {
                 geometry,
                 ..settings.clone()
@@ -342,7 +407,7 @@ fn few_storage_buffers_are_bound() {
                 if binds_scene { 3 } else { 2 },
                 "{file:?} with {names:?}"
             );
-            let reads_scene = effects.has(Effect::List) || effects.has(Effect::Table);
+            let reads_scene = effects.keeps_spheres() || effects.has(Effect::Table);
             assert_eq!(binds_scene, reads_scene, "{file:?} with {names:?}");
             most = most.max(buffers);
         }
@@ -370,6 +435,7 @@ fn bindings_are_found_by_name() {
         "scene",
         "sum_high",
         "sum_low",
+        "tree",
         "view",
     ];
     assert_eq!(names, expected);
@@ -398,7 +464,7 @@ fn accounted(effects: &Effects) -> Vec<&'static str> {
 
 #[test]
 fn every_loop_is_accounted_for() {
-    let mut longest = 0;
+    let mut found = BTreeSet::new();
     for file in scene_files() {
         let scene = scene_file(&file);
         for (kernel, _, effects) in kernels(&scene) {
@@ -406,11 +472,12 @@ fn every_loop_is_accounted_for() {
             loops.sort_unstable();
             let names: Vec<_> = effects.names().collect();
             assert_eq!(loops, accounted(&effects), "{file:?} with {names:?}");
-            longest = longest.max(loops.len());
+            let used = (0..LOOPS.len()).filter(|i| (LOOPS[*i].used)(&effects));
+            found.extend(used);
         }
     }
-    // One with all the loops that there are was among them.
-    assert_eq!(longest, LOOPS.len());
+    // All the loops that there are were among them.
+    assert_eq!(found.len(), LOOPS.len());
 }
 
 #[test]

@@ -18,6 +18,7 @@ mod placing;
 mod random;
 mod sampled;
 mod sampling;
+mod tree;
 mod variance;
 
 pub use crate::verify::Measure;
@@ -55,7 +56,7 @@ pub struct Case {
 /// All cases, by number.
 #[must_use]
 pub fn cases() -> Vec<Case> {
-    let groups: [&[Case]; 10] = [
+    let groups: [&[Case]; 11] = [
         intersection::CASES,
         placing::CASES,
         lights::CASES,
@@ -65,6 +66,7 @@ pub fn cases() -> Vec<Case> {
         integrator::CASES,
         film::CASES,
         random::CASES,
+        tree::CASES,
         variance::CASES,
     ];
     let mut all = groups.concat();

@@ -249,7 +249,7 @@ pub struct RenderArgs {
         hide_possible_values = true,
         hide_default_value = true,
         help_heading = "Device",
-        help = "Spheres in the kernel: auto, baked (constants) or list (a buffer) [default: auto]"
+        help = "Spheres in the kernel: auto, baked (constants), list (a buffer) or bvh (a tree) [default: auto]"
     )]
     pub geometry: GeometryChoice,
     #[arg(

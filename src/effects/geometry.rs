@@ -5,8 +5,8 @@ use super::{Effect, Row, when};
 use crate::placement::Side;
 use crate::settings::{GeometryChoice, Offset};
 
-/// Spheres up to which they are baked into the kernel as constants: measured, see
-/// `benches/RESULTS.md`.
+/// Spheres up to which they are baked into the kernel as constants, and beyond which a tree is faster than a loop
+/// over all: measured, see `benches/RESULTS.md`.
 pub const BAKED_LIMIT: usize = 64;
 
 /// Most spheres that can be baked at all: beyond, compiling takes minutes.
@@ -14,18 +14,40 @@ pub const BAKED_MOST: usize = 256;
 
 pub(super) fn rows() -> Vec<Row> {
     vec![
-        form(true).excludes([Effect::List]),
-        form(false).marks([
-            "FIRST_CENTERED",
-            "SPHERE_COUNT",
-            "Attributes",
-            "Sphere",
-            "spheres",
-            "attributes",
-            "MATERIAL_COUNT",
-            "SceneData::materials",
-            "nearer",
-            "nearer_sphere",
+        form(Effect::Baked, "baked", "spheres as constants in the kernel")
+            .excludes([Effect::List, Effect::Bvh]),
+        form(
+            Effect::List,
+            "list",
+            "a loop over spheres in a storage buffer",
+        )
+        .excludes([Effect::Bvh])
+        .marks(["FIRST_CENTERED", "spheres", "nearer_sphere"]),
+        form(Effect::Bvh, "bvh", "a tree over spheres in a texture").marks([
+            "tree",
+            "data::texel",
+            "sphere_at",
+            "Attributes::place",
+            "TREE_ROOT",
+            "TREE_STACK",
+            "TREE_APART",
+            "TREE_WIDTH",
+            "tree_steps",
+            "NOTHING",
+            "LEAF",
+            "SLACK",
+            "OFFSET_SLACK",
+            "LEAST",
+            "BoxRay",
+            "box_ray",
+            "Children",
+            "in_order",
+            "children_of",
+            "nearer_leaf",
+            "nearer_known",
+            "nearest_beside",
+            "traverse",
+            "ends_loops",
         ]),
         Row::new(
             Effect::Pole,
@@ -136,27 +158,31 @@ pub(super) fn rows() -> Vec<Row> {
     ]
 }
 
-/// The form of the geometry.
-fn form(baked: bool) -> Row {
-    let (effect, name, what) = if baked {
-        (Effect::Baked, "baked", "spheres as constants in the kernel")
+/// The form of the geometry that `auto` takes for so many spheres.
+fn automatic(count: usize) -> Effect {
+    if count <= BAKED_LIMIT {
+        Effect::Baked
     } else {
-        (
-            Effect::List,
-            "list",
-            "a loop over spheres in a storage buffer",
-        )
-    };
+        Effect::Bvh
+    }
+}
+
+/// A form of the geometry.
+fn form(effect: Effect, name: &'static str, what: &'static str) -> Row {
     Row::new(effect, name, what, move |asked| {
         let count = asked.placement.spheres.len();
-        let (chosen, why) = match asked.settings.geometry {
-            GeometryChoice::Auto => (
-                count <= BAKED_LIMIT,
-                format!("{count} spheres; baked up to {BAKED_LIMIT}"),
-            ),
-            GeometryChoice::Baked => (true, "--geometry baked".into()),
-            GeometryChoice::List => (false, "--geometry list".into()),
+        let choice = asked.settings.geometry;
+        let chosen = match choice {
+            GeometryChoice::Auto => automatic(count),
+            GeometryChoice::Baked => Effect::Baked,
+            GeometryChoice::List => Effect::List,
+            GeometryChoice::Bvh => Effect::Bvh,
         };
-        when(chosen == baked, || why)
+        when(chosen == effect, || match choice {
+            GeometryChoice::Auto => {
+                format!("{count} spheres; baked up to {BAKED_LIMIT}, bvh beyond")
+            }
+            _ => format!("--geometry {}", choice.name()),
+        })
     })
 }

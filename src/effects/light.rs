@@ -56,6 +56,7 @@ pub(super) fn rows() -> Vec<Row> {
             "share_of_light",
             "receive_direct",
             "light_weight",
+            "lamp_hit",
             "lighting",
             "LIGHT_COUNT",
             "is_delta",

@@ -32,6 +32,8 @@ pub enum Effect {
     Baked,
     /// A loop over spheres in a storage buffer.
     List,
+    /// A tree over spheres.
+    Bvh,
     /// Frames at the poles of large spheres.
     Pole,
     /// Paths inside spheres.
@@ -354,13 +356,17 @@ impl Effects {
         ])
     }
 
-    /// The form of the geometry: `baked` or `list`.
+    /// Whether spheres are in buffers, not in the kernel.
+    #[must_use]
+    pub fn keeps_spheres(&self) -> bool {
+        !self.has(Effect::Baked)
+    }
+
+    /// The form of the geometry: `baked`, `list` or `bvh`.
     #[must_use]
     pub fn geometry(&self) -> &'static str {
-        if self.has(Effect::Baked) {
-            "baked"
-        } else {
-            "list"
-        }
+        let forms = [Effect::Baked, Effect::Bvh];
+        let form = forms.into_iter().find(|form| self.has(*form));
+        form.unwrap_or(Effect::List).name()
     }
 }

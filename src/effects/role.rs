@@ -14,9 +14,14 @@ pub struct Role {
 impl Effects {
     /// Which file plays which role.
     #[must_use]
-    pub fn roles(&self) -> [Role; 6] {
+    pub fn roles(&self) -> [Role; 7] {
         let has = |effect| self.has(effect);
-        let geometry = (!has(Effect::Baked)).then_some("scene/list");
+        let geometry = match (self.keeps_spheres(), has(Effect::Bvh)) {
+            (false, _) => None,
+            (true, false) => Some("scene/list"),
+            (true, true) => Some("scene/bvh"),
+        };
+        let attributes = self.keeps_spheres().then_some("scene/attributes");
         let media = match (self.transmits(), has(Effect::Priority)) {
             (false, _) => None,
             (true, false) => Some("scene/media/single"),
@@ -43,6 +48,7 @@ impl Effects {
         };
         [
             ("geometry", geometry),
+            ("attributes", attributes),
             ("media", media),
             ("sampler", Some(sampler)),
             ("lights", lights),

@@ -1,9 +1,12 @@
-//! What the kernel reads of a scene, as it lies in its buffer: `SceneData` of `shaders/scene/data.wesl`.
+//! What the kernel reads of a scene, as it lies in its buffer: `SceneData` of `shaders/scene/data.wesl`; and the
+//! tree's texture.
 
 use bytemuck::Pod;
 
+use crate::bvh::WIDTH;
 use crate::effects::{Effect, Effects};
 use crate::error::{Error, Result};
+use crate::gpu::engine::{Pass, Recording};
 use crate::gpu::layout::{LightRecord, MaterialRecord, PoleRecord, SphereRecord, light_weight};
 use crate::materials::Member;
 use crate::placement::Placement;
@@ -13,6 +16,8 @@ use crate::shader::{Kernel, material_members};
 
 /// Name of the buffer.
 pub(super) const SCENE: &str = "scene";
+/// Name of the texture.
+pub(super) const TREE: &str = "tree";
 
 /// Whether the device takes the scene's data, and `partials` bytes of partial sums.
 ///
@@ -35,8 +40,59 @@ pub(super) fn check(limits: &wgpu::Limits, kernel: &Kernel, partials: u64) -> Re
     Ok(())
 }
 
+/// Whether the device takes the tree.
+///
+/// # Errors
+/// [`Error::DeviceLimit`] if it has too many rows of texels.
+pub(super) fn check_tree(limits: &wgpu::Limits, placement: &Placement) -> Result<()> {
+    let (rows, most) = (placement.tree().rows(), limits.max_texture_dimension_2d);
+    if rows.max(WIDTH) > most {
+        return Err(Error::DeviceLimit(format!(
+            "the tree over the spheres needs a texture of {WIDTH} x {rows} texels, more than the device's \
+             limit of {most}; --backend cpu has no such limit"
+        )));
+    }
+    Ok(())
+}
+
+/// What the device holds of a scene.
+#[derive(Debug)]
+pub(super) struct SceneBytes {
+    data: Option<Vec<u8>>,
+    tree: Option<Vec<u8>>,
+}
+
+impl SceneBytes {
+    /// What `kernel` reads.
+    pub(super) fn new(
+        kernel: &Kernel,
+        scene: &Scene,
+        placement: &Placement,
+        effects: &Effects,
+    ) -> Self {
+        let texels = |effects: &Effects| {
+            let tree = effects.has(Effect::Bvh).then(|| placement.tree())?;
+            Some(bytemuck::cast_slice(&tree.texels).to_vec())
+        };
+        Self {
+            data: scene_data(kernel, scene, placement, effects),
+            tree: texels(effects),
+        }
+    }
+
+    /// Uploads what `pass` binds.
+    pub(super) fn upload<'a>(&'a self, recording: &mut Recording<'a>, pass: &Pass) {
+        if let Some(data) = self.data.as_ref().filter(|_| pass.binds(SCENE)) {
+            recording.upload(SCENE, data);
+        }
+        if let Some(tree) = self.tree.as_ref().filter(|_| pass.binds(TREE)) {
+            recording.upload_texels(TREE, tree, WIDTH);
+        }
+    }
+}
+
 /// The bytes that `kernel` reads; `None` if it reads nothing of the scene.
-pub(super) fn scene_data(
+fn scene_data(
     kernel: &Kernel,
     scene: &Scene,
     placement: &Placement,
@@ -93,6 +149,10 @@ fn attributes(placement: &Placement, effects: &Effects) -> Vec<u8> {
         }
         if effects.has(Effect::Lights) {
             words.push((light_weight(index, placement, effects) as f32).to_bits());
+        }
+        if effects.has(Effect::Bvh) {
+            let centered = index.checked_sub(placement.poles);
+            words.push(centered.map_or(0, |i| placement.tree().places[i]));
         }
     }
     bytes_of(words.into_iter())

@@ -8,6 +8,7 @@ use bytemuck::{Pod, Zeroable};
 
 use crate::effects::Effects;
 use crate::error::{Error, Result};
+use crate::gpu::data::SceneBytes;
 use crate::gpu::device::Gpu;
 use crate::gpu::engine::{Engine, Program, Recording};
 use crate::gpu::layout::CameraRecord;
@@ -42,6 +43,7 @@ pub struct Probe {
     gpu: Gpu,
     program: Program,
     camera: CameraRecord,
+    data: SceneBytes,
 }
 
 impl Probe {
@@ -54,8 +56,10 @@ impl Probe {
         let kernel = link(Stage::Probe, scene, placement, effects)?;
         let program = Program::new(gpu, "probe", kernel);
         gpu.check()?;
+        let data = SceneBytes::new(program.kernel(), scene, placement, effects);
         Ok(Self {
             gpu: gpu.clone(),
+            data,
             program,
             camera: CameraRecord::new(&placement.camera),
         })
@@ -95,6 +99,9 @@ impl Probe {
         let pass = self.program.pass(&self.gpu, &entry, &[])?;
         let mut engine = Engine::new(self.gpu.clone());
         let mut outputs = Vec::with_capacity(inputs.len());
+        let mut data = Recording::default();
+        self.data.upload(&mut data, &pass);
+        engine.run(data)?;
         for part in inputs.chunks(DISPATCH) {
             let shape = ShapeRecord {
                 count: part.len() as u32,

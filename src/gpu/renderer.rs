@@ -7,10 +7,11 @@ use std::time::Instant;
 
 use bytemuck::Zeroable as _;
 
+use crate::effects::Effect;
 use crate::error::{Error, Result};
 use crate::film::{AovSums, PixelSums, TILE, Tally, Tiles, Window};
 use crate::gpu::aov::AovLayout;
-use crate::gpu::data::{self, SCENE};
+use crate::gpu::data::{self, SceneBytes};
 use crate::gpu::device::Gpu;
 use crate::gpu::engine::{Engine, Pass, Program, Recording};
 use crate::gpu::layout::{CameraRecord, ChosenTiles, CountersRecord, DispatchRecord};
@@ -20,7 +21,7 @@ use crate::job::Job;
 use crate::render::{Control, Renderer};
 use crate::sampler::Sampler;
 use crate::settings::{Integrator, Rect, stream_words};
-use crate::shader::steps::{LOOP_ITERATIONS, vertex_steps};
+use crate::shader::steps::step_limit;
 use crate::shader::{Kernel, Stage, link};
 
 pub use crate::gpu::pace::DispatchLimits;
@@ -71,6 +72,9 @@ impl GpuRenderer {
         );
         let partials = u64::from(width) * u64::from(height) * u64::from(partial_size);
         data::check(&gpu.limits, &kernel, partials)?;
+        if effects.has(Effect::Bvh) {
+            data::check_tree(&gpu.limits, placement)?;
+        }
 
         let program = Program::new(&gpu, "path", kernel);
         let mut constants = vec![("MAX_BOUNCES", f64::from(settings.max_bounces))];
@@ -91,25 +95,19 @@ impl GpuRenderer {
         let camera = CameraRecord::new(&placement.camera);
         let all = ChosenTiles::all();
         let nothing = DispatchRecord::zeroed();
-        let data = data::scene_data(program.kernel(), scene, placement, effects);
+        let data = SceneBytes::new(program.kernel(), scene, placement, effects);
         let mut recording = Recording::default();
         recording.upload(VIEW, bytemuck::bytes_of(&camera));
         if render.binds(ADAPTIVE_TILES) {
             recording.upload(ADAPTIVE_TILES, bytemuck::bytes_of(&all));
         }
-        if let Some(data) = &data {
-            recording.upload(SCENE, data);
-        }
+        data.upload(&mut recording, &render);
         // Some drivers compile at the first dispatch: one that does nothing takes that out of the
         // rendering's time.
         recording.upload(DISPATCH, bytemuck::bytes_of(&nothing));
         recording.dispatch(&render, 1);
         engine.run(recording)?;
 
-        // A path that is begun must fit.
-        let vertex = u64::from(vertex_steps(placement, effects));
-        let path = (u64::from(settings.max_bounces) + 1) * vertex;
-        let step_limit = LOOP_ITERATIONS.saturating_sub(path).max(1) as u32;
         Ok(Self {
             engine,
             program,
@@ -121,7 +119,7 @@ impl GpuRenderer {
             side,
             radiance_scale: placement.radiance_scale,
             pace: Pace::unknown(),
-            step_limit,
+            step_limit: step_limit(placement, effects, settings.max_bounces),
         })
     }
 
@@ -139,6 +137,14 @@ impl GpuRenderer {
         self
     }
 
+    /// The same renderer whose invocations start no further path after so many loop iterations, whatever the driver
+    /// stands: for tests of what happens then.
+    #[must_use]
+    pub fn with_step_limit(mut self, steps: u32) -> Self {
+        self.step_limit = steps;
+        self
+    }
+
     /// The kernel in use.
     #[must_use]
     pub fn kernel(&self) -> &Kernel {
@@ -150,6 +156,8 @@ impl GpuRenderer {
     fn finish_tiles(&mut self, mut record: DispatchRecord) -> Result<()> {
         let tiles = record.end_tile - record.first_tile;
         let of_dispatch = offset_of!(CountersRecord, unfinished) as u64;
+        // Pixels without progress in the last dispatch.
+        let mut stuck = None;
         loop {
             let mut recording = Recording::default();
             recording
@@ -162,7 +170,8 @@ impl GpuRenderer {
             if counters.unfinished == 0 {
                 return Ok(());
             }
-            if counters.advanced == 0 {
+            // Paths side by side may have used up what is allowed to them together, and some be gone now.
+            if counters.advanced == 0 && stuck == Some(counters.unfinished) {
                 return Err(Error::Gpu(format!(
                     "{}: {} pixels make no progress: a path takes more loop iterations than the \
                      driver allows. Lower --max-bounces, or use --backend cpu",
@@ -170,6 +179,7 @@ impl GpuRenderer {
                     counters.unfinished
                 )));
             }
+            stuck = (counters.advanced == 0).then_some(counters.unfinished);
             record.fresh = 0;
         }
     }

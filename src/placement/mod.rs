@@ -20,8 +20,11 @@ pub use lights::{Light, Lights};
 pub use media::{Media, Medium};
 pub use sphere::{PlacedSphere, Side};
 
+use std::sync::OnceLock;
+
 use glam::DVec3;
 
+use crate::bvh::{Ball, Tree};
 use crate::scene::Scene;
 use crate::settings::Offset;
 use camera::approach;
@@ -54,6 +57,8 @@ pub struct Placement {
     pub offset: Offset,
     /// What light sampling chooses from.
     pub lights: Lights,
+    /// Made when it is first asked for.
+    tree: OnceLock<Tree>,
 }
 
 impl Placement {
@@ -144,6 +149,35 @@ impl Placement {
             within,
             camera,
             offset,
+            tree: OnceLock::new(),
         }
+    }
+
+    /// The tree over the spheres about their centres, as f32 has them.
+    ///
+    /// Those that paths are always in are beside it.
+    #[must_use]
+    pub fn tree(&self) -> &Tree {
+        self.tree
+            .get_or_init(|| Tree::new(&self.balls(), self.poles as u32))
+    }
+
+    /// The same with another tree, for tests of one that is made wrongly.
+    #[must_use]
+    pub fn with_tree(mut self, tree: Tree) -> Self {
+        self.tree = OnceLock::from(tree);
+        self
+    }
+
+    /// What is in the tree, or beside it.
+    #[must_use]
+    pub fn balls(&self) -> Vec<Ball> {
+        let centered = &self.spheres[self.poles..];
+        let ball = |sphere: &PlacedSphere| Ball {
+            center: sphere.anchor.as_vec3(),
+            radius: sphere.radius as f32,
+            apart: sphere.side == Side::Inside,
+        };
+        centered.iter().map(ball).collect()
     }
 }

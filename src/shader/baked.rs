@@ -1,4 +1,4 @@
-//! Geometry form `baked`: the module `scene/baked`, written for one scene. Every sphere is a few
+//! Geometry form `baked`: the modules `geometry` and `attributes`, written for one scene. Every sphere is a few
 //! constants in straight-line code, the nearest hit is kept by selection, and nothing is loaded.
 
 use std::fmt::Write as _;
@@ -21,11 +21,9 @@ pub(super) fn vector(v: DVec3) -> String {
     format!("vec3f({}, {}, {})", number(v.x), number(v.y), number(v.z))
 }
 
-pub(super) fn geometry(scene: &Scene, placement: &Placement, effects: &Effects) -> String {
-    let mut text = String::from(
-        "import package::scene::ray::{Ray, Hit, Frame, NO_HIT, NO_SPHERE};\n\
-         import package::bsdf::Material;\n",
-    );
+/// The module `geometry`: what a ray hits.
+pub(super) fn geometry(placement: &Placement, effects: &Effects) -> String {
+    let mut text = String::from("import package::scene::ray::{Ray, Hit, NO_HIT, NO_SPHERE};\n");
     let centered = placement.spheres.iter().any(|s| s.pole.is_none());
     if centered {
         text += "import package::scene::sphere::sphere_quadratic;\n";
@@ -47,6 +45,20 @@ pub(super) fn geometry(scene: &Scene, placement: &Placement, effects: &Effects) 
             text += &format!("import package::{name};\n");
         }
     }
+    closest_hit(&mut text, placement, effects);
+    if effects.has(Effect::Lights) {
+        text += "fn lamp_hit(ray: Ray, lamp: u32, limb: f32) -> Hit {\n\
+                 return closest_hit(ray);\n}\n";
+    }
+    text
+}
+
+/// The module `attributes`: what is known of each sphere, and of all lamps.
+pub(super) fn attributes(scene: &Scene, placement: &Placement, effects: &Effects) -> String {
+    let mut text = String::from(
+        "import package::scene::ray::Frame;\n\
+         import package::bsdf::Material;\n",
+    );
     if effects.weighs_lights() {
         text += "import package::scene::ray::Vertex;\n\
                  import package::lights::{Weighed, weigh};\n\
@@ -55,7 +67,6 @@ pub(super) fn geometry(scene: &Scene, placement: &Placement, effects: &Effects) 
             text += "import package::light::aim::aim_pole;\n";
         }
     }
-    closest_hit(&mut text, placement, effects);
     frame_of(&mut text, placement, effects);
     material_of(&mut text, scene, placement, effects);
     if effects.has(Effect::Lights) {
@@ -125,7 +136,7 @@ fn within(placement: &Placement, index: usize) -> String {
 }
 
 /// When a sphere can be hit that lies just within another, or has one just within it; see
-/// `can_be_hit` in `shaders/scene/list.wesl`.
+/// `can_be_hit` in `shaders/scene/nearer.wesl`.
 fn can_be_hit(placement: &Placement, effects: &Effects, sphere: &PlacedSphere) -> Option<String> {
     let container = sphere.container.map(|c| within(placement, c));
     let cores = sphere.cores.iter();

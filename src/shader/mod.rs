@@ -14,6 +14,7 @@ pub use names::declared_names;
 
 use wesl::{CompileOptions, ManglerKind, ModulePath, VirtualResolver, Wesl};
 
+use crate::bvh;
 use crate::effects::{Effect, Effects, Role};
 use crate::error::{Error, Result};
 use crate::materials;
@@ -127,8 +128,10 @@ pub fn link(
         config(scene, placement, effects).into(),
     );
     if effects.has(Effect::Baked) {
-        let text = baked::geometry(scene, placement, effects);
+        let text = baked::geometry(placement, effects);
         resolver.add_module(module_path("geometry"), text.into());
+        let text = baked::attributes(scene, placement, effects);
+        resolver.add_module(module_path("attributes"), text.into());
     }
     let mut compiler = Wesl::new_barebones().set_custom_resolver(resolver);
     compiler
@@ -199,12 +202,23 @@ fn module_path(path: &str) -> ModulePath {
 /// The module `config`: sizes and constants of this scene.
 fn config(scene: &Scene, placement: &Placement, effects: &Effects) -> String {
     let mut text = String::new();
-    if effects.has(Effect::List) {
+    if effects.keeps_spheres() {
         text += &format!("const SPHERE_COUNT: u32 = {}u;\n", placement.spheres.len());
         text += &format!("const MATERIAL_COUNT: u32 = {}u;\n", scene.materials.len());
         if effects.has(Effect::Pole) {
             text += &format!("const POLE_COUNT: u32 = {}u;\n", placement.poles);
         }
+    }
+    if effects.has(Effect::Bvh) {
+        let tree = placement.tree();
+        text += &format!(
+            "const TREE_WIDTH: u32 = {}u;\nconst TREE_ROOT: u32 = {}u;\n\
+             const TREE_STACK: u32 = {}u;\nconst TREE_APART: u32 = {}u;\n",
+            bvh::WIDTH,
+            tree.root,
+            tree.stack(),
+            tree.apart
+        );
     }
     text += &format!(
         "const RAY_STEPS: u32 = {}u;\n",

@@ -6,9 +6,11 @@
 //! further path beyond a limit that leaves room for one more; the host dispatches again. A path that alone
 //! takes more is no sample, and an error: a loop within it may have been ended.
 //!
-//! A tree's loop will have no length that is known beforehand. It counts itself: its iterations come
-//! back with the hit, the loop over vertices adds them to `steps` as it adds RAY_STEPS, and its row here
-//! is the most that a ray can take, all nodes, so that the room for one more path is kept.
+//! A tree's loop has no length that is known beforehand, and its most, all nodes, may be beyond any limit. It counts
+//! itself (`tree_steps`), and an invocation starts no further path beyond a quarter of what it may make. That
+//! is not enough: llvmpipe counts the iterations of some invocations together, eight on most machines, and these
+//! differ in a tree. So a path that has ended asks a loop of its own whether loops still turn (`ends_loops` in
+//! `shaders/path.wesl`); if they do not, it is no sample, and the next dispatch begins it again.
 
 use crate::effects::{Effect, Effects};
 use crate::placement::Placement;
@@ -32,7 +34,7 @@ pub struct Loop {
 }
 
 /// All loops of the path tracer's kernel.
-pub const LOOPS: [Loop; 4] = [
+pub const LOOPS: [Loop; 8] = [
     // Over vertices.
     Loop {
         function: "render",
@@ -41,11 +43,37 @@ pub const LOOPS: [Loop; 4] = [
     },
     // Over spheres about their poles.
     Loop {
-        function: "closest_hit",
-        used: |effects| effects.has(Effect::List) && effects.has(Effect::Pole),
+        function: "nearest_pole",
+        used: |effects| effects.keeps_spheres() && effects.has(Effect::Pole),
         at_vertex: |placement, effects| rays(effects) * (placement.poles + 1),
     },
-    // Over the others.
+    // Over leaves beside the tree.
+    Loop {
+        function: "nearest_beside",
+        used: |effects| effects.has(Effect::Bvh),
+        at_vertex: |placement, effects| rays(effects) * (placement.tree().apart as usize + 1),
+    },
+    // Over the dielectrics that a ray may be in.
+    Loop {
+        function: "nearest_beside",
+        used: |effects| effects.has(Effect::Bvh) && effects.has(Effect::Priority),
+        at_vertex: |placement, effects| {
+            rays(effects) * (placement.media.levels.max(1) as usize + 1)
+        },
+    },
+    // Over nodes: it counts itself.
+    Loop {
+        function: "traverse",
+        used: |effects| effects.has(Effect::Bvh),
+        at_vertex: |_, _| 0,
+    },
+    // Whether loops still turn.
+    Loop {
+        function: "ends_loops",
+        used: |effects| effects.has(Effect::Bvh),
+        at_vertex: |_, _| 2,
+    },
+    // Over the spheres of a list.
     Loop {
         function: "closest_hit",
         used: |effects| effects.has(Effect::List),
@@ -57,7 +85,7 @@ pub const LOOPS: [Loop; 4] = [
     // Over the lights that are weighed.
     Loop {
         function: "weigh_lights",
-        used: |effects| effects.weighs_lights() && effects.has(Effect::List),
+        used: |effects| effects.weighs_lights() && effects.keeps_spheres(),
         at_vertex: |placement, _| placement.lights.table.len().max(1) + 1,
     },
 ];
@@ -67,12 +95,24 @@ fn rays(effects: &Effects) -> usize {
     1 + usize::from(effects.has(Effect::Lights))
 }
 
-/// Most loop iterations that the kernel makes for one vertex of a path.
+/// Most loop iterations that the kernel makes for one vertex of a path, but for those of loops that count themselves.
 #[must_use]
 pub fn vertex_steps(placement: &Placement, effects: &Effects) -> u32 {
     let loops = LOOPS.iter().filter(|l| (l.used)(effects));
     let steps: usize = loops.map(|l| (l.at_vertex)(placement, effects)).sum();
     steps as u32
+}
+
+/// Loop iterations after which an invocation is to start no further path.
+#[must_use]
+pub fn step_limit(placement: &Placement, effects: &Effects, max_bounces: u32) -> u32 {
+    if effects.has(Effect::Bvh) {
+        return (LOOP_ITERATIONS / 4) as u32;
+    }
+    // A path that is begun must fit.
+    let vertex = u64::from(vertex_steps(placement, effects));
+    let path = (u64::from(max_bounces) + 1) * vertex;
+    LOOP_ITERATIONS.saturating_sub(path).max(1) as u32
 }
 
 /// Loops of a block, those within others among them.

@@ -124,7 +124,8 @@ pub(crate) fn leave_pictures(name: &str, found: &Picture, wanted: &Picture) -> S
 pub(crate) fn probe_of(scene: &Scene, effects: &[&str]) -> Probe {
     let settings = Settings::for_scene(scene);
     let placement = Placement::with_offset(scene, settings.width, settings.height, settings.offset);
-    let geometry: &[&str] = if effects.contains(&"list") {
+    let stored = |effect: &&str| ["list", "bvh"].contains(effect);
+    let geometry: &[&str] = if effects.iter().any(stored) {
         &[]
     } else {
         &["baked"]

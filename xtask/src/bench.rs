@@ -12,6 +12,7 @@ Usage: cargo xtask bench [TABLE...] [--quick]
   unused     effects that a scene does not use
   offsets    ways to leave a surface: what each gets wrong, and costs
   geometry   spheres as constants or in a buffer
+  trees      a loop over all spheres against a tree, for 32 to 1e6 of them
   loading    from a scene file to the first dispatch: each stage for 1e3, 1e4 and 1e5 spheres
   forecasts  what price says of five scenes, and what the renders then take (some minutes)
   resources  time to the first window, peak memory
@@ -27,10 +28,11 @@ Without a name: all but forecasts, peers, hazards and coverage. Run it on an idl
 
 /// Runs the benchmarks named in `tables`.
 pub(crate) fn all(tables: &[String]) -> Result<(), String> {
-    const KNOWN: [&str; 10] = [
+    const KNOWN: [&str; 11] = [
         "naive",
         "unused",
         "geometry",
+        "trees",
         "offsets",
         "loading",
         "resources",
@@ -53,7 +55,7 @@ pub(crate) fn all(tables: &[String]) -> Result<(), String> {
     }
     let chosen = |name: &str| tables.is_empty() || tables.iter().any(|t| t == name);
     run(cargo().args(["build", "--release"]))?;
-    let in_process: Vec<&str> = KNOWN[..5]
+    let in_process: Vec<&str> = KNOWN[..6]
         .iter()
         .copied()
         .filter(|name| chosen(name))

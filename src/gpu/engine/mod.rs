@@ -90,6 +90,15 @@ impl Engine {
                     self.submit(pending.take());
                     self.upload(name, bytes);
                 }
+                Command::UploadTexels {
+                    name,
+                    texels,
+                    width,
+                } => {
+                    self.submit(pending.take());
+                    let texture = Resource::texels(&self.gpu, name, texels, width);
+                    self.resources.insert(name, texture);
+                }
                 Command::Clear { name, from } => {
                     let buffer = self
                         .resource(name)?

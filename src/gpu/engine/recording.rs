@@ -9,6 +9,11 @@ pub(super) enum Command<'a> {
         name: &'static str,
         bytes: &'a [u8],
     },
+    UploadTexels {
+        name: &'static str,
+        texels: &'a [u8],
+        width: u32,
+    },
     Clear {
         name: &'static str,
         from: u64,
@@ -34,6 +39,21 @@ impl<'a> Recording<'a> {
     /// one that is not there is made.
     pub(in crate::gpu) fn upload(&mut self, name: &'static str, bytes: &'a [u8]) -> &mut Self {
         self.push(Command::Upload { name, bytes })
+    }
+
+    /// Makes the texture `name`, which passes only read, of whole rows of `width` texels of four words. It replaces
+    /// any of that name.
+    pub(in crate::gpu) fn upload_texels(
+        &mut self,
+        name: &'static str,
+        texels: &'a [u8],
+        width: u32,
+    ) -> &mut Self {
+        self.push(Command::UploadTexels {
+            name,
+            texels,
+            width,
+        })
     }
 
     /// Sets the buffer `name` to zero, from byte `from` on.

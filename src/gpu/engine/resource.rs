@@ -1,6 +1,7 @@
 //! One buffer or texture, and the buffer through which it is read back.
 
 use super::reading::Rows;
+use crate::gpu::device::Gpu;
 
 /// Bytes of a texel.
 const TEXEL: u32 = 16;
@@ -48,6 +49,33 @@ impl Resource {
             usage: wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::COPY_SRC,
             view_formats: &[],
         });
+        let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
+        Self {
+            content: Content::Texture(texture, view),
+            staging: None,
+        }
+    }
+
+    /// A texture that passes only read.
+    pub(super) fn texels(gpu: &Gpu, name: &str, texels: &[u8], width: u32) -> Self {
+        let size = extent([width, texels.len() as u32 / (width * TEXEL)]);
+        let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
+            label: Some(name),
+            size,
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: wgpu::TextureFormat::Rgba32Uint,
+            usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
+            view_formats: &[],
+        });
+        let layout = wgpu::TexelCopyBufferLayout {
+            offset: 0,
+            bytes_per_row: Some(width * TEXEL),
+            rows_per_image: None,
+        };
+        gpu.queue
+            .write_texture(texture.as_image_copy(), texels, layout, size);
         let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
         Self {
             content: Content::Texture(texture, view),
