@@ -2,7 +2,8 @@
 //!
 //! Source: RFC 4180, with the crate `csv`. The columns `x`, `y` and `z` must be there and `element` may be, in
 //! capitals or not; so are `radius` and `diameter` recognised. `#` may stand before the names, and before lines
-//! that say something else. A value that is left out is NaN.
+//! that say something else. A value that is left out is NaN, and
+//! a line without any is no particle.
 
 use ::csv::{ByteRecord, Reader, ReaderBuilder};
 
@@ -46,10 +47,11 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Particles, Mistake> {
             Ok(false) => break,
             Err(error) => return Err(place(&record).mistake(error.to_string())),
         }
+        // Spreadsheets write such lines below the last value.
+        if record.iter().all(|field| field.trim_ascii().is_empty()) {
+            continue;
+        }
         if record.len() != table.columns() {
-            if record.iter().all(|field| field.trim_ascii().is_empty()) {
-                continue;
-            }
             return Err(place(&record).mistake(format!(
                 "the line has {} values; the first line names {}",
                 record.len(),
@@ -79,20 +81,20 @@ fn reader(bytes: &[u8], delimiter: u8) -> Reader<&[u8]> {
         .from_reader(bytes)
 }
 
-/// The line at a byte.
+/// The first line from a byte on that is neither blank nor a comment: such lines count to the record behind them.
 fn line_at(bytes: &[u8], byte: u64, number: u64) -> Line<'_> {
     let rest = usize::try_from(byte)
         .ok()
         .and_then(|byte| bytes.get(byte..));
-    // A record may begin with the line ends before it.
-    let rest = rest.unwrap_or_default();
-    let blank = rest.iter().take_while(|byte| matches!(byte, b'\r' | b'\n'));
-    let rest = &rest[blank.count()..];
-    let length = rest.iter().position(|byte| matches!(byte, b'\r' | b'\n'));
-    Line {
-        bytes: &rest[..length.unwrap_or(rest.len())],
-        number,
-    }
+    let lines = rest.unwrap_or_default().split(|byte| *byte == b'\n');
+    (number..)
+        .zip(lines)
+        .map(|(number, line)| Line {
+            bytes: line.strip_suffix(b"\r").unwrap_or(line),
+            number,
+        })
+        .find(|line| !line.bytes.is_empty() && !line.bytes.starts_with(b"#"))
+        .unwrap_or(Line { bytes: b"", number })
 }
 
 /// The line of names, what stands between them, and the names: the first line that is no comment, or a comment

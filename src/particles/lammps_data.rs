@@ -155,3 +155,6 @@ fn columns(line: Line<'_>, style: Option<&'static [&'static str]>) -> Result<Tab
     let columns = named.map(|name| ((*name).to_owned(), Kind::of_name(name)));
     Table::new(columns.collect()).map_err(|fault| line.mistake(fault))
 }
+
+#[cfg(test)]
+mod tests;

@@ -236,3 +236,6 @@ fn columns(line: Line<'_>) -> Result<(Vec<(String, Kind)>, bool), Mistake> {
     };
     Ok((names.into_iter().map(kind).collect(), scaled))
 }
+
+#[cfg(test)]
+mod tests;

@@ -159,7 +159,9 @@ impl<'a> Atoms<'a> {
                 Some(token) if token.is_value() => row.push(token),
                 _ if row.is_empty() => return Ok(false),
                 Some(token) => {
-                    return Err(token.line.mistake(self.incomplete(row.len())));
+                    return Err(token
+                        .line
+                        .mistake(format!("wanted {}", self.incomplete(row.len()))));
                 }
                 None => return Err(self.tokens.ended(&self.incomplete(row.len()))),
             }

@@ -115,4 +115,4 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Particles, Mistake> {
 }
 
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;

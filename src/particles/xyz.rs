@@ -123,3 +123,6 @@ fn after(lines: &Lines<'_>, count: u64) -> Result<(), Mistake> {
         shown(line.bytes)
     )))
 }
+
+#[cfg(test)]
+mod tests;
