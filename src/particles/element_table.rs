@@ -1,13 +1,15 @@
 //! What is known of each chemical element.
 
-/// Symbol, name (IUPAC), colour (sRGB, `0xRR_GG_BB`), van der Waals and covalent radius (ångström), by
-/// atomic number from 1.
+/// Symbol, name (IUPAC), colour (sRGB, `0xRR_GG_BB`), van der Waals and covalent radius (ångström).
+pub(super) type Row = (&'static str, &'static str, u32, Option<f64>, Option<f64>);
+
+/// All elements, by atomic number from 1.
 ///
 /// Colours: Jmol, <https://jmol.sourceforge.net/jscolors/>, which ends at 109; beyond, the pink that Jmol
 /// gives to atoms of no known element. Van der Waals radii: S. Alvarez, "A cartography of the van der Waals
 /// territories", Dalton Trans. 42 (2013) 8617. Covalent radii: B. Cordero et al., "Covalent radii revisited",
 /// Dalton Trans. (2008) 2832; of several, that of sp³ carbon and of low spin manganese, iron and cobalt.
-pub(super) const ELEMENTS: [(&str, &str, u32, Option<f64>, Option<f64>); 118] = [
+pub(super) const ELEMENTS: [Row; 118] = [
     ("H", "hydrogen", 0xFF_FF_FF, Some(1.20), Some(0.31)),
     ("He", "helium", 0xD9_FF_FF, Some(1.43), Some(0.28)),
     ("Li", "lithium", 0xCC_80_FF, Some(2.12), Some(1.28)),
