@@ -977,7 +977,7 @@ fn particle_files(format: Format) -> Vec<Vec<u8>> {
             "ply\nformat binary_big_endian 1.0\nelement a 1\nproperty list uchar uchar b\nelement vertex 1\n\
              property uchar x\nproperty uchar y\nproperty uchar z\nelement face 0\nend_header\n\u{1}ABCD",
             "ply\nformat binary_little_endian 1.0\nelement vertex 1\nproperty float x\nproperty float y\n\
-             property float z\nproperty list uchar int t\nend_header\n0000111122220",
+             property float z\nproperty list uchar int t\nend_header\n000011112222\0",
         ],
         Format::Npy => &[],
     };

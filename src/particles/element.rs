@@ -1,6 +1,6 @@
 //! A chemical element.
 
-use super::element_table::ELEMENTS;
+use super::element_table::{ELEMENTS, Row};
 
 /// A chemical element, by its atomic number (1 to 118).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -84,7 +84,7 @@ impl Element {
         self.row().4
     }
 
-    fn row(self) -> &'static (&'static str, &'static str, u32, Option<f64>, Option<f64>) {
+    fn row(self) -> &'static Row {
         // An element is made of 1 to 118 only.
         &ELEMENTS[usize::from(self.0) - 1]
     }

@@ -1,10 +1,9 @@
 //! What is known of each chemical element.
 
-/// One element: see [`ELEMENTS`].
-type Row = (&'static str, &'static str, u32, Option<f64>, Option<f64>);
+/// Symbol, name (IUPAC), colour (sRGB, `0xRR_GG_BB`), van der Waals and covalent radius (ångström).
+pub(super) type Row = (&'static str, &'static str, u32, Option<f64>, Option<f64>);
 
-/// Symbol, name (IUPAC), colour (sRGB, `0xRR_GG_BB`), van der Waals and covalent radius (ångström), by
-/// atomic number from 1.
+/// All elements, by atomic number from 1.
 ///
 /// Colours: Jmol, <https://jmol.sourceforge.net/jscolors/>, which ends at 109; beyond, the pink that Jmol
 /// gives to atoms of no known element. Van der Waals radii: S. Alvarez, "A cartography of the van der Waals
