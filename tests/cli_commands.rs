@@ -13,7 +13,8 @@ const COMMANDS: &str = "render effects price check compare converge devices scen
 const OPTIONS: &str = "--output --stats --aov --exposure --dump-wgsl --progress --quiet --verbose \
     --spp --adaptive --error --time --sample-range --size --crop --seed --integrator \
     --light-sampling --sampler --max-bounces \
-    --roulette --termination --backend --device --offset --geometry --threads --allow-non-finite";
+    --roulette --termination --backend --device --offset --geometry --threads --allow-non-finite \
+    --color-by --radius-by --map --background";
 
 #[test]
 fn the_kernel_holds_what_the_scene_asks_for() {
