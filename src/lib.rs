@@ -5,7 +5,8 @@
 //!
 //! 1. [`cli`]: what was typed.
 //! 2. [`settings`]: how it will be rendered. [`sampler`]: which samples are placed together.
-//! 3. [`scene`]: the scene file, validated.
+//! 3. [`scene`]: the scene file, validated. [`particles`]: what files of other programs hold, which it takes spheres
+//!    from.
 //! 4. [`placement`]: where everything is, in f64, relative to where the picture is; what lies in what, which of
 //!    several dielectrics fills the space, what light sampling chooses from.
 //!    [`bvh`]: a tree over many spheres.
