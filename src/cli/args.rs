@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use clap::Args;
+use clap::{Args, Parser};
 
 use super::choices::{self, Wanted};
 use super::fault::Fault;
@@ -70,6 +70,19 @@ pub struct RenderArgs {
         help = "Write the kernel as plain WGSL before rendering"
     )]
     pub dump_wgsl: Option<PathBuf>,
+    #[arg(
+        long,
+        value_name = "FILE",
+        help_heading = "Output",
+        help = "Keep all sums in this new film file: `resume` goes on from there, `merge` joins parts"
+    )]
+    pub checkpoint: Option<PathBuf>,
+    #[arg(
+        long, value_name = "TIME", value_parser = values::time, allow_hyphen_values = true,
+        requires = "checkpoint", help_heading = "Output",
+        help = "How often to write the film file [default: 60s]"
+    )]
+    pub checkpoint_every: Option<Duration>,
     #[arg(
         long,
         help_heading = "Output",
@@ -263,7 +276,21 @@ pub struct RenderArgs {
     pub inject_fault: Option<Fault>,
 }
 
+/// The options of `render`, as a command of their own.
+#[derive(Parser)]
+struct Alone {
+    #[command(flatten)]
+    render: RenderArgs,
+}
+
 impl RenderArgs {
+    /// Those of a command line without any.
+    pub(super) fn none() -> Result<Self> {
+        Alone::try_parse_from(["gpu-trace"])
+            .map(|alone| alone.render)
+            .map_err(|error| Error::Usage(error.to_string()))
+    }
+
     /// The scene file, if the scene is one: no output may replace it.
     pub(super) fn scene_file(&self) -> Option<&Path> {
         self.scene
@@ -363,36 +390,4 @@ impl RenderArgs {
         }
         Ok(())
     }
-}
-
-/// The options of `check`.
-#[derive(Clone, Debug, Args)]
-pub(super) struct CheckArgs {
-    /// Only this case, by number or part of its name; may be repeated.
-    #[arg(long, value_name = "NAME", allow_hyphen_values = true,
-          value_parser = clap::builder::NonEmptyStringValueParser::new())]
-    pub(super) case: Vec<String>,
-    /// Fewer trials: under a minute without a GPU.
-    #[arg(long)]
-    pub(super) quick: bool,
-    /// Print JSON.
-    #[arg(long)]
-    pub(super) json: bool,
-    /// Say what each case sets up, and where its worst error is.
-    #[arg(short, long)]
-    pub(super) verbose: bool,
-    /// How paths leave a surface: exact, or to see what fails then none, back:X, out:X, ulp.
-    #[arg(
-        long,
-        value_name = "MODE",
-        default_value = "exact",
-        hide_default_value = true
-    )]
-    pub(super) offset: Offset,
-    /// Which adapter, as `gpu-trace devices` lists them.
-    #[arg(long, value_name = "INDEX|NAME")]
-    pub(super) device: Option<String>,
-    /// Give every case a slightly wrong truth: all must fail (a check of the check).
-    #[arg(long)]
-    pub(super) disturb: bool,
 }

@@ -4,7 +4,7 @@
 //! nothing is guessed in silence.
 
 mod exr;
-mod npy;
+pub(crate) mod npy;
 mod png;
 
 use std::collections::BTreeMap;

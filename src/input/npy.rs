@@ -123,18 +123,18 @@ fn check_data(bytes: &[u8], width: u32, height: u32, pixel_bytes: u64) -> io::Re
 }
 
 /// What the header says of the array; whether that is acceptable is the caller's question.
-struct Header {
+pub(crate) struct Header {
     /// The literal of the type, as in `'<f4'`, quotes and all.
     descr: String,
     /// Whether the first index runs fastest.
-    fortran_order: bool,
+    pub(crate) fortran_order: bool,
     /// The literal of the shape, as in `(480, 640, 3)`.
     shape: String,
 }
 
 impl Header {
     /// Reads what stands between the first bytes and the data.
-    fn read(source: &mut impl Read) -> io::Result<Self> {
+    pub(crate) fn read(source: &mut impl Read) -> io::Result<Self> {
         let length = match read_array(source)? {
             [1, _] => usize::from(u16::from_le_bytes(read_array(source)?)),
             // Later versions only lift limits that arrays of numbers do not meet.
@@ -202,14 +202,14 @@ impl Header {
     }
 
     /// The type's name if it is a plain one, as in `<f4`.
-    fn descr(&self) -> Option<&str> {
+    pub(crate) fn descr(&self) -> Option<&str> {
         quoted(&self.descr)
             .filter(|(_, rest)| rest.is_empty())
             .map(|(name, _)| name)
     }
 
     /// The array's sizes; empty if the shape is no tuple of them.
-    fn sizes(&self) -> Vec<u32> {
+    pub(crate) fn sizes(&self) -> Vec<u32> {
         let inner = self
             .shape
             .strip_prefix('(')

@@ -5,7 +5,7 @@
 
 use std::fs::{self, File};
 use std::io::{self, Read};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
 use serde::Deserialize;
@@ -28,6 +28,10 @@ pub struct Loaded {
     pub name: String,
     /// What is legal and probably not meant, each rendered with file, line, column and the line.
     pub warnings: Vec<String>,
+    /// The scene file's text.
+    pub text: String,
+    /// The folder of the scene file; `None` for a built-in scene.
+    pub folder: Option<PathBuf>,
     /// Hash of the scene's values (16 hexadecimal digits), see [`content_hash`].
     pub hash: String,
 }
@@ -47,7 +51,10 @@ pub fn load_file(path: &Path) -> Result<Loaded> {
         .file_stem()
         .map_or_else(|| shown.clone(), |stem| stem.to_string_lossy().into_owned());
     match str::from_utf8(&bytes) {
-        Ok(text) => load(name, &shown, text),
+        Ok(text) => Ok(Loaded {
+            folder: path.parent().map(Path::to_owned),
+            ..load(name, &shown, text)?
+        }),
         Err(error) => Err(not_utf8(&shown, &bytes, error.valid_up_to())),
     }
 }
@@ -110,6 +117,8 @@ fn load(name: String, shown: &str, text: &str) -> Result<Loaded> {
     Ok(Loaded {
         hash: content_hash(&scene),
         warnings: report.warning_texts(shown, text),
+        text: text.to_owned(),
+        folder: None,
         name,
         scene,
     })

@@ -1,13 +1,19 @@
 //! `gpu-trace render`: from a scene file to images.
 
+mod checkpoint;
 mod display;
+mod merge;
+mod resume;
 mod statistics;
 mod summary;
 
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
+use self::checkpoint::Checkpoint;
 use self::display::Display;
+pub(super) use self::merge::{MergeArgs, run as merge};
+pub(super) use self::resume::{ResumeArgs, run as resume};
 use self::statistics::statistics;
 use self::summary::{left_out, no_stderr, not_finite, observations, summary};
 use super::args::RenderArgs;
@@ -16,6 +22,7 @@ use super::print;
 use super::signals::Signals;
 use crate::backend::{Backend, BackendKind, LEAST_PIXEL_BYTES, check_memory};
 use crate::error::{Error, Result};
+use crate::film_file::About;
 use crate::gpu::device::Gpu;
 use crate::image::{Format, Picture};
 use crate::job::{Job, prepare};
@@ -24,7 +31,7 @@ use crate::output::stats::{Device, Seconds};
 use crate::output::{
     Contents, Layer, Plane, Progress, Stats, Target, atomic, check_all, write_all,
 };
-use crate::render::{Outcome, Renderer, StoppedBy, render};
+use crate::render::{Begun, Keep, Outcome, Renderer, StoppedBy, go_on};
 use crate::scene::builtin;
 use crate::scene::load::Loaded;
 use crate::shader::{Stage, link};
@@ -34,12 +41,21 @@ struct Request {
     loaded: Loaded,
     job: Job,
     targets: Vec<Target>,
+    /// A render that goes on, and its film file.
+    begun: Option<(Begun, About)>,
 }
 
 impl Request {
-    /// The images, as they were typed.
-    fn files(&self) -> String {
-        let files: Vec<String> = self.targets.iter().map(ToString::to_string).collect();
+    /// The images, as they were typed; the film file where there are none.
+    fn files(&self, args: &RenderArgs) -> String {
+        let mut files: Vec<String> = self.targets.iter().map(ToString::to_string).collect();
+        if files.is_empty() {
+            files.extend(
+                args.checkpoint
+                    .iter()
+                    .map(|path| path.display().to_string()),
+            );
+        }
         files.join(", ")
     }
 }
@@ -47,7 +63,13 @@ impl Request {
 /// Runs `render`.
 pub(super) fn run(args: &RenderArgs) -> Result<()> {
     let begin = Instant::now();
-    let request = request(args)?;
+    perform(args, request(args)?, begin)
+}
+
+/// Renders what was decided.
+fn perform(args: &RenderArgs, mut request: Request, begin: Instant) -> Result<()> {
+    let begun = request.begun.take();
+    let request = request;
     let job = &request.job;
     let signals = Signals::listen()?;
     let progress = Progress::new(args.progress, args.quiet);
@@ -79,14 +101,52 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
             job.effects().names().collect::<Vec<_>>().join(", ")
         ));
     }
+    let device = Device {
+        name,
+        backend: interface,
+        driver,
+    };
+    let (begun, about) = begun.unzip();
+    let checkpoint = args.checkpoint.as_ref().map(|path| {
+        let about = checkpoint::about(
+            args,
+            &request,
+            about,
+            backend.kind(),
+            &device,
+            &mut warnings,
+        )?;
+        Ok(Checkpoint::new(
+            path,
+            args.checkpoint_every,
+            about,
+            &progress,
+        ))
+    });
+    let mut checkpoint = checkpoint.transpose()?;
     for warning in &warnings {
         progress.warning(warning);
     }
     let said = warnings.len();
+    if let (
+        Some(path),
+        Some(Begun {
+            finished: Some(_), ..
+        }),
+    ) = (&args.checkpoint, &begun)
+    {
+        progress.message(&format!("{} is complete: nothing is added", path.display()));
+    }
+    let finished = begun.as_ref().is_some_and(|b| b.finished.is_some());
 
     let mut watch = Display::new(&progress, &signals, job.settings());
-    let outcome = render(renderer.as_mut(), job, &mut watch);
+    let keep = checkpoint.as_mut().map(|c| c as &mut dyn Keep);
+    let outcome = go_on(renderer.as_mut(), job, &mut watch, begun, keep);
     progress.finish();
+    let kept = match checkpoint {
+        Some(checkpoint) if !finished => checkpoint.end(&outcome, &mut warnings),
+        _ => Ok(()),
+    };
     // Its memory is needed again.
     drop(renderer);
     let auditing = Instant::now();
@@ -101,17 +161,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
     for warning in &warnings[said..] {
         progress.warning(warning);
     }
-    let stats = statistics(
-        &request.loaded,
-        job,
-        &outcome,
-        backend.kind(),
-        Device {
-            name,
-            backend: interface,
-            driver,
-        },
-    );
+    let stats = statistics(&request.loaded, job, &outcome, backend.kind(), device);
     let stats = Stats {
         seconds: Seconds {
             total: begin.elapsed().as_secs_f64(),
@@ -126,9 +176,10 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
     };
     let written = finish(args, &request, &outcome, &stats);
     if let Some(failure) = &outcome.failure {
-        return Err(failed(failure, &outcome, &request, written));
+        return Err(failed(failure, &outcome, &request.files(args), written));
     }
     written?;
+    kept?;
     if let Some(text) = not_finite(&outcome).filter(|_| !args.allow_non_finite) {
         return Err(Error::NonFinite(format!(
             "{text} (--allow-non-finite makes this a warning)"
@@ -140,13 +191,10 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
 }
 
 /// A failure in the middle of a render, with what became of the samples before it.
-fn failed(failure: &Error, outcome: &Outcome, request: &Request, written: Result<()>) -> Error {
+fn failed(failure: &Error, outcome: &Outcome, files: &str, written: Result<()>) -> Error {
     let saved = match (outcome.film.samples(), written) {
         (0, _) => "no samples were done, and no file was changed".to_owned(),
-        (spp, Ok(())) => format!(
-            "the {spp} samples a pixel done before are in {}",
-            request.files()
-        ),
+        (spp, Ok(())) => format!("the {spp} samples a pixel done before are in {files}"),
         (_, Err(error)) => error.to_string(),
     };
     Error::Gpu(format!("{failure}; {saved}"))
@@ -172,6 +220,10 @@ fn request(args: &RenderArgs) -> Result<Request> {
     let mut outputs: Vec<&Path> = targets.iter().map(|t| t.path.as_path()).collect();
     outputs.extend(args.stats.as_deref());
     outputs.extend(args.dump_wgsl.as_deref());
+    outputs.extend(args.checkpoint.as_deref());
+    if let Some(path) = &args.checkpoint {
+        checkpoint::check_new(path)?;
+    }
     check_all(&outputs, args.scene_file().as_slice())?;
     let job = prepare(&loaded.scene, &settings)?;
     // What is needed beside is known with the device.
@@ -180,6 +232,7 @@ fn request(args: &RenderArgs) -> Result<Request> {
         loaded,
         job,
         targets,
+        begun: None,
     })
 }
 
@@ -252,7 +305,7 @@ fn finish(args: &RenderArgs, request: &Request, outcome: &Outcome, stats: &Stats
     if args.quiet {
         Ok(())
     } else {
-        print(&summary(&request.files(), stats))
+        print(&summary(&request.files(args), stats))
     }
 }
 
