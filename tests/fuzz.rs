@@ -24,6 +24,8 @@ use glam::DVec3;
 use gpu_trace::cli::{Cli, RenderArgs};
 use gpu_trace::effects::Effects;
 use gpu_trace::error::Error;
+use gpu_trace::film::{AovSums, Film, PixelSums, Tally, Window};
+use gpu_trace::film_file::{self, About, Choices, Command, FORMAT, Goal, SceneText, encode};
 use gpu_trace::image::Picture;
 use gpu_trace::input::{decode, read};
 use gpu_trace::output::{Layer, Metadata, Target, exr, npy, png};
@@ -929,6 +931,73 @@ fn no_bytes_upset_the_image_readers() {
         }
     });
     assert!(tried.accepted > 0 && tried.refused > 0, "{tried:?}");
+}
+
+// ---- Film files ----
+
+/// Films of a few pixels, without and with layers.
+fn films() -> Vec<Vec<u8>> {
+    let room = room();
+    [false, true]
+        .map(|classes| {
+            let mut settings = Settings::for_scene(&room);
+            (settings.crop.width, settings.crop.height) = (3, 2);
+            (settings.samples, settings.classes) = (0..16, classes);
+            let rect = settings.crop;
+            let mut film = Film::new(rect);
+            film.add(&Window {
+                rect,
+                samples: 0..16,
+                batch: 4,
+                pixels: vec![PixelSums::default(); 6],
+                aovs: vec![AovSums::default(); if classes { 6 } else { 0 }],
+                tally: Tally::default(),
+            });
+            let about = About {
+                format: FORMAT,
+                version: String::from("1"),
+                kernels: Vec::new(),
+                devices: Vec::new(),
+                scene: SceneText {
+                    name: "a".into(),
+                    text: "b".into(),
+                    folder: None,
+                    hash: "c".into(),
+                },
+                settings: Choices::of(&settings),
+                goal: Goal::of(&settings),
+                ranges: vec![[0, 16]],
+                samples: vec![16],
+                counts: film.counts(),
+                pilot: 0,
+                look: 64,
+                seconds: 1.5,
+                stopped_by: None,
+                command: Command::default(),
+            };
+            encode(&about, &film).expect("memory takes it")
+        })
+        .to_vec()
+}
+
+#[test]
+fn no_bytes_upset_the_film_reader() {
+    let seeds = films();
+    let read = |bytes: &[u8]| film_file::decode(Cursor::new(bytes));
+    assert!(seeds.iter().all(|bytes| read(bytes).is_ok()));
+    let tried = fuzz("films", numbers(20_000), &seeds, |_, bytes| {
+        match read(bytes) {
+            Ok(file) => {
+                assert_eq!(file.film.pixels().len(), file.film.rect().pixels());
+                true
+            }
+            Err(error) => {
+                assert!(!error.to_string().is_empty());
+                false
+            }
+        }
+    });
+    assert!(tried.refused > 0, "{tried:?}");
 }
 
 // ---- The command line ----

@@ -183,6 +183,12 @@ impl Choices {
         }
     }
 
+    /// Whether pixels have sums beside their light.
+    #[must_use]
+    pub fn has_layers(&self) -> bool {
+        self.classes || self.features
+    }
+
     /// The settings, with what will end the render.
     ///
     /// # Errors

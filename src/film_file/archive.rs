@@ -162,11 +162,6 @@ impl<R: Read + Seek> Reader<R> {
         Film::of_record(rect, record).map_err(invalid)
     }
 
-    /// Whether there are sums beside the light.
-    pub(super) fn has_layers(&self) -> bool {
-        self.zip.index_for_name("layers.npy").is_some()
-    }
-
     /// An array of this type and shape and no other, whose values `read` takes: memory is asked for only once
     /// the entry has been found to be as long as they are.
     fn array<T>(

@@ -95,11 +95,8 @@ pub fn decode(from: impl Read + Seek) -> io::Result<FilmFile> {
     }
     let about: About =
         serde_json::from_value(value).map_err(|e| invalid(format!("film.json: {e}")))?;
-    let film = file.film(
-        about.settings.crop(),
-        about.counts.clone(),
-        file.has_layers(),
-    )?;
+    let choices = &about.settings;
+    let film = file.film(choices.crop(), about.counts.clone(), choices.has_layers())?;
     about
         .check(&film)
         .map_err(|text| invalid(format!("film.json: {text}")))?;

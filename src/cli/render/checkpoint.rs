@@ -19,14 +19,14 @@ const EVERY: Duration = Duration::from_secs(60);
 /// Refuses a film file that is there: the command that wrote it would begin again, and replace what `resume`
 /// goes on from.
 pub(super) fn check_new(path: &Path) -> Result<()> {
-    if path.symlink_metadata().is_ok_and(|data| data.is_file()) {
+    if path.is_file() {
         let shown = path.display();
         return Err(Error::Usage(format!(
             "--checkpoint {shown}: the file is there already; gpu-trace resume {shown} goes on from it, \
              or remove it first"
         )));
     }
-    if path.exists() && !path.is_file() {
+    if path.exists() {
         return Err(Error::Usage(format!(
             "--checkpoint {}: a film file is a regular file",
             path.display()

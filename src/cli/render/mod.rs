@@ -175,6 +175,12 @@ fn perform(args: &RenderArgs, mut request: Request, begin: Instant) -> Result<()
         ..stats
     };
     let written = finish(args, &request, &outcome, &stats);
+    if outcome.failure.is_some() || written.is_err() {
+        // What is said last is another error.
+        if let Err(error) = &kept {
+            progress.warning(&error.to_string());
+        }
+    }
     if let Some(failure) = &outcome.failure {
         return Err(failed(failure, &outcome, &request.files(args), written));
     }
