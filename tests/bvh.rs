@@ -6,12 +6,14 @@ mod common;
 mod thorough;
 
 use bytemuck::{Pod, Zeroable};
-use common::{gpu, render_gpu, scene, scene_file, scene_files};
+use common::{gpu, gpu_renderer, render_gpu, scene, scene_file, scene_files};
 use glam::{DVec3, Vec3};
 use gpu_trace::bvh::{Ball, MOST_SAH_LEVELS, NOTHING, Options, Tree, WIDTH};
 use gpu_trace::effects::Effects;
 use gpu_trace::gpu::probe::Probe;
 use gpu_trace::placement::{Placement, Side};
+use gpu_trace::render::render_quietly;
+use gpu_trace::scene::Scene;
 use gpu_trace::settings::{GeometryChoice, Settings};
 use gpu_trace::verify::{
     Crowd, EMPTY, Random, RayRows, Row, crowds, image_bits, settings, share_off, vector,
@@ -331,6 +333,7 @@ fn a_lamp_is_seen_where_it_is_the_first_hit() {
 
 #[test]
 fn every_scene_by_the_tree_is_that_of_the_list() {
+    let (mut noticed, mut all) = (0, 0);
     for path in scene_files() {
         let scene = scene_file(&path);
         let film = |geometry, seed| {
@@ -347,7 +350,66 @@ fn every_scene_by_the_tree_is_that_of_the_list() {
         let same = image_bits(&list) == image_bits(&tree);
         eprintln!("{}: {off}, the same bits: {same}", path.display());
         assert!(off < 0.02, "{}: {off} of the values differ", path.display());
+        // Companion: other samples, but for scenes of one radiance everywhere.
+        noticed += usize::from(share_off(&film(GeometryChoice::Bvh, 1), &list) > 0.02);
+        all += 1;
     }
+    assert!(
+        2 * noticed > all,
+        "other samples are noticed in {noticed} scenes of {all}"
+    );
+}
+
+/// Very many tiny balls in a thin tube, seen from its end: a ray passes thousands of boxes on its way to the sky, and
+/// about every third ray meets a ball.
+fn tube() -> Scene {
+    const HALF: f64 = 2.0e-4;
+    let mut random = Random::new("tube");
+    let mut text = String::from(
+        "
+        [camera]
+        position = [0.0, 0.0, -3.0]
+        look_at = [0.0, 0.0, 0.0]
+        fov = 0.004
+        [image]
+        width = 16
+        height = 16
+        [environment]
+        radiance = [1.0, 1.0, 1.0]
+        [material.gray]
+        type = \"diffuse\"
+        albedo = [0.5, 0.5, 0.5]
+        ",
+    );
+    for _ in 0..24_000 {
+        let [x, y] = [(); 2].map(|()| random.range(-HALF, HALF));
+        let z = random.range(-1.0, 1.0);
+        text += &format!(
+            "[[sphere]]\ncenter = [{x:?}, {y:?}, {z:?}]\nradius = 1.0e-6\nmaterial = \"gray\"\n"
+        );
+    }
+    scene(&text)
+}
+
+/// A driver that ends loops in silence ends a way through the tree, and the path then misses what comes. Without
+/// the question whether loops still turn that would be a sample, and too bright.
+#[test]
+fn paths_whose_way_through_the_tree_is_ended_are_no_samples() {
+    let scene = tube();
+    let settings = Settings {
+        geometry: GeometryChoice::Bvh,
+        ..settings(&scene, 16, 16, 16)
+    };
+    let film = |steps| {
+        let mut renderer = gpu_renderer(&scene, &settings).with_step_limit(steps);
+        let outcome = render_quietly(&mut renderer, &settings);
+        outcome.unwrap_or_else(|e| panic!("{e}")).film
+    };
+    // One path an invocation and dispatch, or as many as the driver lets it.
+    let (short, long) = (film(1), film(u32::MAX));
+    let same = image_bits(&short) == image_bits(&long);
+    assert!(same, "the image depends on where the driver ended loops");
+    assert_eq!(short.tally(), long.tally());
 }
 
 #[test]

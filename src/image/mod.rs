@@ -3,7 +3,7 @@
 
 pub mod exr;
 mod format;
-pub mod srgb;
+mod srgb;
 
 pub use format::Format;
 pub use srgb::{linear, srgb};

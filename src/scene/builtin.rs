@@ -59,8 +59,8 @@ pub fn get(name: &str) -> Option<&'static Builtin> {
 
 /// The scene that a command line's `SCENE` means.
 ///
-/// Nothing means the default scene. A word that ends as a particle file does is one. A word with a path separator or ending in `.toml` is always a
-/// file. Any other word is an existing file, else a built-in scene.
+/// Nothing means the default scene. A word that ends as a particle file does is one. A word with a path
+/// separator or ending in `.toml` is always a file. Any other word is an existing file, else a built-in scene.
 ///
 /// # Errors
 /// Those of [`load_file`], and [`Error::Usage`] for a word that is neither.

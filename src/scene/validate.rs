@@ -116,19 +116,20 @@ pub(super) fn scene(
         });
     }
 
-    let named: HashMap<String, usize> = names
-        .into_iter()
-        .map(|(name, index)| (name.to_owned(), index))
-        .collect();
+    // Those of the file: colours of particles come after them.
+    let own = materials.len();
     let mut files = Vec::new();
     for table in &file.particles {
         let request = particles::request(table, folder, report);
         let material = match &table.material {
             None => None,
-            Some(name) => match named.get(name.get_ref()) {
-                Some(index) => Some(*index),
+            Some(name) => match materials[..own]
+                .iter()
+                .position(|m| m.name == *name.get_ref())
+            {
+                Some(index) => Some(index),
                 None => {
-                    let problem = unknown_material(name.get_ref(), &materials);
+                    let problem = unknown_material(name.get_ref(), &materials[..own]);
                     report.errors.push(Problem {
                         span: name.span(),
                         ..problem
@@ -148,12 +149,14 @@ pub(super) fn scene(
             Err(fault) => report.errors.push(particles::problem(&fault, table)),
         }
     }
-    used.extend(spans.len()..materials.len());
+    used.extend(own..materials.len());
     if !spheres.is_empty() && spheres.iter().all(|sphere| sphere.radius < SHORTEST) {
-        let largest = largest(&file.sphere).map(Spanned::span);
-        let file = file.particles.first().map(|table| table.file.span());
-        let message = "the spheres are too small to compute with: this is the largest `radius`";
-        let problem = Problem::new(largest.or(file).unwrap_or_default(), message, "");
+        let largest =
+            largest(&file.sphere).map(|radius| (radius.span(), ": this is the largest `radius`"));
+        let particles = file.particles.first().map(|table| (table.file.span(), ""));
+        let (span, which) = largest.or(particles).unwrap_or_default();
+        let message = format!("the spheres are too small to compute with{which}");
+        let problem = Problem::new(span, message, "");
         report
             .errors
             .push(problem.help(format!("one of them must have at least {SHORTEST:e}")));

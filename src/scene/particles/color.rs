@@ -4,7 +4,7 @@ use colorous::Gradient;
 use glam::DVec3;
 
 use super::{Fault, column};
-use crate::image::srgb::linear;
+use crate::image::linear;
 use crate::particles::{Element, Particles};
 
 /// Steps of a colour map: more than the eye tells apart, and each is a material.

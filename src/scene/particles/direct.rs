@@ -98,8 +98,13 @@ pub fn load(path: &Path, look: &Look) -> Result<Loaded> {
         transform: Similarity::IDENTITY,
     });
     let cloud = cloud.map_err(|fault| usage(&fault))?;
-    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-    let name = stem.split('.').next().unwrap_or_default().to_owned();
+    // Without its ending, and that of gzip before it.
+    let plain = match path.extension() {
+        Some(ending) if ending.eq_ignore_ascii_case("gz") => path.with_extension(""),
+        _ => path.to_owned(),
+    };
+    let stem = plain.file_stem().unwrap_or_default();
+    let name = stem.to_string_lossy().into_owned();
     let scene = scene(cloud, look.background.unwrap_or(BACKGROUND));
     Ok(Loaded {
         hash: content_hash(&scene),
@@ -118,7 +123,7 @@ fn usage(fault: &Fault) -> Error {
         _ => "",
     };
     let help = match &fault.help {
-        Some(help) => format!("; {}", help.replace("`radius` is", "--radius-by is")),
+        Some(help) => format!("; {help}"),
         None => String::new(),
     };
     Error::Usage(format!("{option}{}{help}", fault.message))

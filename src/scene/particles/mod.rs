@@ -201,11 +201,11 @@ pub fn gather(request: &Request) -> Result<Cloud, Fault> {
         let center = linear * particles.positions[index] + shift;
         if !(radius > 0.0 && radius <= MAX_MAGNITUDE) {
             let message = format!(
-                "the radius of particle {} is {radius}, and must be positive",
+                "the radius of particle {} is {radius}; it must be positive, and at most {MAX_MAGNITUDE:e}",
                 index + 1
             );
             return Err(Fault::new("radius", message)
-                .help("`select` can leave particles out: `select = \"radius > 0\"`"));
+                .help("in a scene file `select = \"radius > 0\"` leaves such particles out"));
         }
         // Also what is no number.
         let inside = center.is_finite() && center.abs().max_element() <= MAX_MAGNITUDE;
@@ -267,7 +267,7 @@ fn radii<'p>(particles: &'p Particles, by: Option<&RadiusBy>) -> Result<Radii<'p
         None if particles.elements.is_some() => RadiusBy::VanDerWaals,
         None => {
             let message = "the file says neither radii nor elements, so a radius is needed";
-            let help = "`radius` is a number, or the name of a column";
+            let help = "a radius is a number, or the name of a column";
             return Err(Fault::new("radius", message).help(help));
         }
     };
@@ -287,7 +287,7 @@ fn radii<'p>(particles: &'p Particles, by: Option<&RadiusBy>) -> Result<Radii<'p
                         "no {what} radius is known for particle {}, whose element is {name}",
                         index + 1
                     );
-                    Fault::new("radius", message).help("`radius` may be a number or a column")
+                    Fault::new("radius", message).help("a radius may also be a number or a column")
                 })
             }))
         };
