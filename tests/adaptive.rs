@@ -1,10 +1,8 @@
 //! Adaptive sampling: samples go where the error is, and no pixel's mean has a bias.
 
-mod common;
-
 use std::collections::BTreeSet;
 
-use common::{cpu_renderer, gpu_renderer, render_cpu, render_gpu, scene, scene_file};
+use crate::common::{cpu_renderer, gpu_renderer, render_cpu, render_gpu, scene, scene_file};
 use gpu_trace::film::{
     Allocation, Estimate, Film, PILOT_SAMPLES, PixelSums, Tally, Window, next_look, window_end,
 };

@@ -5,11 +5,9 @@
 //! z of the mean (|z| < 3.9), and equivalence: the 99 % interval of the bias lies within 0.1 % of the
 //! mean. Power: a scene whose albedos are 1 % off fails (the companion).
 
-mod common;
-
 use std::path::Path;
 
-use common::{leave, render_cpu, render_gpu, scene_file, scene_files};
+use crate::common::{leave, render_cpu, render_gpu, scene_file, scene_files};
 use gpu_trace::film::Film;
 use gpu_trace::materials::MaterialKind;
 use gpu_trace::scene::Scene;

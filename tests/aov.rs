@@ -1,10 +1,7 @@
 //! Layers beside the image: light by the kind of its path, and what is seen first.
 
-mod cli_support;
-mod common;
-
-use cli_support::{Folder, holds};
-use common::{render_cpu, render_gpu, scene, scene_file};
+use crate::cli_support::{Folder, holds};
+use crate::common::{render_cpu, render_gpu, scene, scene_file};
 use gpu_trace::film::{Film, LightClass};
 use gpu_trace::scene::Scene;
 use gpu_trace::settings::{Integrator, Settings};

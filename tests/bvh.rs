@@ -2,11 +2,8 @@
 //!
 //! `gpu-trace check` has the hits of all crowds, case 40.
 
-mod common;
-mod thorough;
-
+use crate::common::{gpu, gpu_renderer, render_gpu, scene, scene_file, scene_files};
 use bytemuck::{Pod, Zeroable};
-use common::{gpu, gpu_renderer, render_gpu, scene, scene_file, scene_files};
 use glam::{DVec3, Vec3};
 use gpu_trace::bvh::{Ball, MOST_SAH_LEVELS, NOTHING, Options, Tree, WIDTH};
 use gpu_trace::effects::Effects;
@@ -238,7 +235,7 @@ fn companion_smaller_boxes_are_found() {
 #[test]
 fn very_many_spheres_at_one_point() {
     // More than a loop may visit; the long form has a million.
-    let count = if thorough::thorough() {
+    let count = if crate::thorough::thorough() {
         1_000_000
     } else {
         100_000

@@ -1,10 +1,7 @@
 //! `gpu-trace check`: every case of the catalogue passes on this device, and every one can fail.
 
-mod cli_support;
-mod common;
-
-use cli_support::{Folder, holds};
-use common::gpu;
+use crate::cli_support::{Folder, holds};
+use crate::common::gpu;
 use gpu_trace::check::{CaseReport, Context, Options, Verdict, cases, exits, probe_driver};
 use gpu_trace::settings::Offset;
 use serde_json::Value;

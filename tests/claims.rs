@@ -1,9 +1,7 @@
 //! Estimators hold what they claim: every integrator, sampler and light sampling, evenly and adaptively.
 //! Each claim has a judge here, and a companion: where the claim would be wrong, its judge finds it.
 
-mod common;
-
-use common::{gpu_renderer, job, scene, scene_file};
+use crate::common::{gpu_renderer, job, scene, scene_file};
 use gpu_trace::error::Result;
 use gpu_trace::film::{Film, window_end};
 use gpu_trace::gpu::renderer::{DispatchLimits, GpuRenderer};

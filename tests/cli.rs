@@ -1,8 +1,6 @@
 //! What the program does when it is used as it should be, through its binary.
 
-mod cli_support;
-
-use cli_support::{BLACK, Folder, bits, holds, mean};
+use crate::cli_support::{BLACK, Folder, bits, holds, mean};
 use exr::meta::MetaData;
 use exr::prelude::{AttributeValue, Text};
 use serde_json::{Value, json};
@@ -251,7 +249,7 @@ fn the_statistics_say_what_was_done() {
 #[test]
 fn the_command_line_wins_over_the_scene() {
     let folder = Folder::with_scene();
-    let scene = cli_support::GOOD.replace(
+    let scene = crate::cli_support::GOOD.replace(
         "[environment]",
         "[render]\nspp = 12\nmax_bounces = 3\n[environment]",
     );

@@ -1,8 +1,6 @@
 //! The commands beside `render`, through the program's binary.
 
-mod cli_support;
-
-use cli_support::{BLACK, Folder, holds};
+use crate::cli_support::{BLACK, Folder, holds};
 use gpu_trace::effects::Effect;
 use gpu_trace::scene::builtin;
 use gpu_trace::shader::declared_names;

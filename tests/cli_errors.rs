@@ -1,9 +1,7 @@
 //! What the program says to bad input, and that it does nothing else: exit code 2, a message that
 //! names the place and the way out, and no file made or changed.
 
-mod cli_support;
-
-use cli_support::{Folder, GOOD, holds};
+use crate::cli_support::{Folder, GOOD, holds};
 
 /// Splits a table whose columns are separated by bars.
 fn rows<const N: usize>(table: &str) -> impl Iterator<Item = [&str; N]> {

@@ -1,13 +1,11 @@
 //! The program among other processes: signals, closed pipes, full devices.
 #![cfg(unix)]
 
-mod cli_support;
-
 use std::process::{Command, Stdio};
 use std::thread::sleep;
 use std::time::Duration;
 
-use cli_support::{Background, Folder, Run, holds};
+use crate::cli_support::{Background, Folder, Run, holds};
 use serde_json::json;
 
 #[test]

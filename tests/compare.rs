@@ -1,8 +1,6 @@
 //! `gpu-trace compare`: figures known by hand or from others' code, and what they lead to.
 
-mod cli_support;
-
-use cli_support::{Folder, holds};
+use crate::cli_support::{Folder, holds};
 use gpu_trace::compare::{HeatMap, Options, Report, Seen, compare, flip, heat_colour, ssim};
 use gpu_trace::image::{Picture, linear};
 use gpu_trace::input::{Input, decode};

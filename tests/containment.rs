@@ -1,10 +1,8 @@
 //! What lies in what: spheres that are left out, and spheres just within another one.
 
-mod common;
-
 use std::fmt::Write as _;
 
-use common::{render_cpu, render_gpu, scene};
+use crate::common::{render_cpu, render_gpu, scene};
 use gpu_trace::effects::{Effect, Effects};
 use gpu_trace::placement::{Placement, Side};
 use gpu_trace::sampler::Sampler;

@@ -1,12 +1,11 @@
 //! Error bars are true: 95 % intervals hold the truth in about 95 % of all pixels, also of renders that
 //! stopped by their error. The long form is `cargo xtask bench coverage`.
 
-mod common;
 #[path = "../benches/coverage/study.rs"]
 #[expect(dead_code, reason = "the long form shows more")]
 mod study;
 
-use common::{gpu, scene_file};
+use crate::common::{gpu, scene_file};
 use gpu_trace::sampler::Sampler;
 use gpu_trace::settings::{Integrator, Settings};
 use gpu_trace::verify::settings;

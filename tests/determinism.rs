@@ -1,9 +1,7 @@
 //! The same bits whenever the same samples are rendered: whatever the crop, the dispatches and the
 //! parts. Other seeds give other bits.
 
-mod common;
-
-use common::{gpu_renderer, render_cpu, render_gpu, scene_file};
+use crate::common::{gpu_renderer, render_cpu, render_gpu, scene_file};
 use gpu_trace::film::Film;
 use gpu_trace::gpu::renderer::DispatchLimits;
 use gpu_trace::render::render_quietly;

@@ -5,12 +5,10 @@
 //! Significance 1e-3 over all tests together (Sidak). Power: a normal turned by a tenth, a cosine taken for
 //! uniform, or a cap 1 % too wide fail (the companions).
 
-mod common;
-
 use std::f64::consts::{PI, TAU};
 
+use crate::common::{gpu, probe, probe_of, scene};
 use bytemuck::Pod;
-use common::{gpu, probe, probe_of, scene};
 use glam::{DVec2, DVec3};
 use gpu_trace::gpu::probe::Probe;
 use gpu_trace::materials::dielectric::{Dielectric, fresnel};

@@ -4,12 +4,9 @@
 //! The sets follow from the table: each effect alone, each two, as many as can be together and these without
 //! one, those of all scenes, and a random sample of the rest, all completed by what their effects need.
 
-mod common;
-mod thorough;
-
 use std::collections::{BTreeMap, BTreeSet};
 
-use common::{scene_file, scene_files};
+use crate::common::{scene_file, scene_files};
 use glam::DVec3;
 use gpu_trace::effects::{Effect, Effects, table};
 use gpu_trace::materials::{ALL, MaterialKind, forms};
@@ -400,7 +397,7 @@ fn all_and_all_but_one() {
 fn a_sample_of_the_rest() {
     let mut random = Random::new("sets of effects");
     let mut sets = BTreeSet::new();
-    while sets.len() < SAMPLED[usize::from(thorough::thorough())] {
+    while sets.len() < SAMPLED[usize::from(crate::thorough::thorough())] {
         // From sparse to dense, in any order.
         let share = random.range(0.1, 0.9);
         let mut order: Vec<(f64, Effect)> = every().map(|e| (random.unit(), e)).collect();

@@ -2,9 +2,6 @@
 //! disks that are full, folders that vanish, signals that end it at the worst moment.
 #![cfg(unix)]
 
-mod cli_support;
-mod common;
-
 use std::fs;
 use std::io;
 use std::os::unix::fs::{MetadataExt as _, PermissionsExt as _, chown};
@@ -14,7 +11,7 @@ use std::process::{Command, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use cli_support::{Background, Folder, Run, bits, holds};
+use crate::cli_support::{Background, Folder, Run, bits, holds};
 use gpu_trace::error::Error;
 use gpu_trace::gpu::renderer::GpuRenderer;
 use gpu_trace::image::{Format, Picture};
@@ -155,12 +152,12 @@ fn faults_are_for_those_who_know_them() {
 
 #[test]
 fn a_scene_beyond_the_devices_limits_is_an_error() {
-    let scene = common::scene_file("scenes/glass.toml");
+    let scene = crate::common::scene_file("scenes/glass.toml");
     let mut settings = gpu_trace::verify::settings(&scene, 64, 64, 1);
     settings.geometry = GeometryChoice::List;
-    let job = common::job(&scene, &settings);
+    let job = crate::common::job(&scene, &settings);
     let with_at_most = |bytes: u64| {
-        let mut gpu = common::gpu();
+        let mut gpu = crate::common::gpu();
         gpu.limits.max_storage_buffer_binding_size = bytes;
         GpuRenderer::new(gpu, &job)
     };

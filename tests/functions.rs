@@ -2,9 +2,7 @@
 //! f32 numbers. Tolerances count roundings, in ULP = 2^-23 (see `gpu_trace::verify::ULP`). The companions feed
 //! the twin with slightly wrong numbers: at least half of the cases must then be off.
 
-mod common;
-
-use common::probe;
+use crate::common::probe;
 use glam::{DVec2, DVec3};
 use gpu_trace::reference::core::sampling::{
     basis_around, cap_direction, circle_point, cosine_direction, sphere_direction,
@@ -229,7 +227,7 @@ fn sums_lose_less_than_a_plain_sum() {
     plain.assert_holds(3 * CASES);
     // A driver may reassociate; the software one that the tests run on where there is no GPU does
     // not, and its images' sums are tested on that.
-    if common::gpu().summary.kind == "software" {
+    if crate::common::gpu().summary.kind == "software" {
         compensated.assert_holds(3 * CASES);
     }
 }

@@ -1,9 +1,7 @@
 //! The rest of `scene/` on the device against its f64 twins: roots, pole frames, vertices, nested
 //! media, cameras. See `functions.rs` for the tolerances.
 
-mod common;
-
-use common::{probe, probe_of, scene};
+use crate::common::{probe, probe_of, scene};
 use glam::DVec3;
 use gpu_trace::placement::{Medium, PlacedSphere, Placement, Side};
 use gpu_trace::reference::scene::camera::camera_ray;

@@ -1,8 +1,6 @@
 //! Scenes whose image is one number, known exactly.
 
-mod common;
-
-use common::{render_gpu, scene, scene_file};
+use crate::common::{render_gpu, scene, scene_file};
 use gpu_trace::film::Film;
 use gpu_trace::scene::Scene;
 use gpu_trace::settings::{GeometryChoice, Settings};

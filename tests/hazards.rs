@@ -2,11 +2,9 @@
 //! with the f64 reference on the same paths, pixel by pixel, or with a number; the companions show the
 //! same test failing where paths leave surfaces by a nudge.
 
-mod common;
-
 use std::fmt::Write as _;
 
-use common::{leave, render_cpu, render_gpu, scene};
+use crate::common::{leave, render_cpu, render_gpu, scene};
 use gpu_trace::film::Film;
 use gpu_trace::scene::Scene;
 use gpu_trace::settings::{Offset, Settings};

@@ -1,10 +1,8 @@
 //! What may be rendered: `prepare` refuses the rest, whoever asks.
 
-mod common;
-
 use std::ops::Range;
 
-use common::scene_file;
+use crate::common::scene_file;
 use gpu_trace::error::Error;
 use gpu_trace::job::prepare;
 use gpu_trace::scene::Scene;

@@ -1,10 +1,8 @@
 //! The structs that host and kernel share have the same layout on both sides.
 
-mod common;
-
 use std::mem::offset_of;
 
-use common::scene;
+use crate::common::scene;
 use glam::DVec3;
 use gpu_trace::effects::Effects;
 use gpu_trace::gpu::layout::{

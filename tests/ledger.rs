@@ -1,8 +1,6 @@
 //! What the ledger says that settings took, against analytic truth and against renders.
 
-mod common;
-
-use common::{gpu, job, render_gpu, scene, scene_file};
+use crate::common::{gpu, job, render_gpu, scene, scene_file};
 use gpu_trace::backend::Backend;
 use gpu_trace::film::Estimate;
 use gpu_trace::job::prepare;

@@ -1,11 +1,9 @@
 //! Light sampling: its directions and densities, and that no estimator differs from another in what it
 //! converges to.
 
-mod common;
-
 use std::f64::consts::TAU;
 
-use common::{probe, render_cpu, render_gpu, scene};
+use crate::common::{probe, render_cpu, render_gpu, scene};
 use gpu_trace::film::Film;
 use gpu_trace::placement::Placement;
 use gpu_trace::placement::lights::MOST_WEIGHED;

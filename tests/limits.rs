@@ -2,14 +2,12 @@
 //! of all loops of an invocation. Renders that need more take several dispatches, or fail loudly. Of
 //! textures: large images are rendered in parts. And of bindings: a pass may have eight storage buffers.
 
-mod common;
-
 use std::cell::RefCell;
 use std::collections::BTreeSet;
 use std::ops::Range;
 use std::time::Duration;
 
-use common::{gpu_renderer, job, render_cpu, render_gpu, scene, scene_file, scene_files};
+use crate::common::{gpu_renderer, job, render_cpu, render_gpu, scene, scene_file, scene_files};
 use gpu_trace::effects::{Effect, Effects};
 use gpu_trace::error::{Error, Result};
 use gpu_trace::film::{Film, PixelSums, Tally, Tiles, Window};
@@ -434,7 +432,7 @@ fn bindings_are_found_by_name() {
     ];
     assert_eq!(names, expected);
     assert_eq!(kernel.bindings("no entry point"), []);
-    let probe = common::probe(&["list"]);
+    let probe = crate::common::probe(&["list"]);
     let names = |entry: &str| {
         let bindings = probe.kernel().bindings(entry);
         let mut names: Vec<String> = bindings.into_iter().map(|b| b.name).collect();

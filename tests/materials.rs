@@ -2,11 +2,9 @@
 //! sample against evaluate, both ways round. Tolerances follow from what the twin makes of inputs that are
 //! slightly off (`verify::bsdf`). And Fresnel's terms, whose truth is known.
 
-mod common;
-
 use std::collections::BTreeSet;
 
-use common::{gpu, probe};
+use crate::common::{gpu, probe};
 use gpu_trace::materials::dielectric::fresnel;
 use gpu_trace::materials::{ALL, forms};
 use gpu_trace::settings::Integrator;

@@ -1,19 +1,16 @@
 //! Images against the path tracer as one writes it first, in f64 (`benches/naive`): it shares nothing with ours,
 //! from the ray through a pixel to random numbers, and finds lamps by chance alone.
 
-mod common;
-mod equivalence;
 #[path = "../benches/naive/mod.rs"]
 #[expect(dead_code, reason = "its kernel is for the benchmarks")]
-mod naive;
-mod thorough;
+mod peer;
 
-use equivalence::{Demand, Independent, check};
+use crate::equivalence::{Demand, Independent, check};
 use gpu_trace::materials::MaterialKind;
 use gpu_trace::scene::Scene;
 use gpu_trace::settings::Settings;
-use naive::flat::FlatScene;
-use naive::tracer::render;
+use peer::flat::FlatScene;
+use peer::tracer::render;
 
 /// What moves a ray off its surface, in scene units: some thousand roundings of f64 in these scenes, and a
 /// hundredth of the thinnest glass.
@@ -25,7 +22,7 @@ const NUDGE: f64 = 1.0e-7;
 ///
 /// The naive image's variance is what its samples met: `spp` must be enough for the rarest light of a pixel.
 fn holds(name: &str, scene: &mut Scene, size: [u32; 2], spp: u32, equivalent: f64) {
-    let (spp, equivalent) = if thorough::thorough() {
+    let (spp, equivalent) = if crate::thorough::thorough() {
         (16 * spp, equivalent / 4.0)
     } else {
         (spp, equivalent)
@@ -48,21 +45,21 @@ fn holds(name: &str, scene: &mut Scene, size: [u32; 2], spp: u32, equivalent: f6
 /// Walls of radius 1000, and colours that throw light back and forth.
 #[test]
 fn lecture() {
-    let mut scene = common::scene_file("scenes/lecture.toml");
+    let mut scene = crate::common::scene_file("scenes/lecture.toml");
     holds("lecture", &mut scene, [16, 16], 8192, 8.0e-3);
 }
 
 /// A mirror, glass, and its caustic, in a closed room.
 #[test]
 fn glass() {
-    let mut scene = common::scene_file("scenes/glass.toml");
+    let mut scene = crate::common::scene_file("scenes/glass.toml");
     holds("glass", &mut scene, [16, 13], 8192, 1.2e-2);
 }
 
 /// A diffuse ball within glass, a lamp, a sky.
 #[test]
 fn mixed() {
-    let mut scene = common::scene_file("tests/references/mixed.toml");
+    let mut scene = crate::common::scene_file("tests/references/mixed.toml");
     holds("mixed", &mut scene, [10, 14], 8192, 5.0e-3);
 }
 
@@ -70,7 +67,7 @@ fn mixed() {
 /// the others.
 #[test]
 fn field() {
-    let mut scene = common::scene_file("scenes/field.toml");
+    let mut scene = crate::common::scene_file("scenes/field.toml");
     let materials = scene.materials.clone();
     let known = |at: usize| !matches!(materials[at].kind, MaterialKind::Reflective(_));
     scene.spheres.retain(|sphere| known(sphere.material));
@@ -81,13 +78,13 @@ fn field() {
 /// Glass of thickness 1e-5, seen and seen through.
 #[test]
 fn shell() {
-    let mut scene = common::scene_file("benches/hazards/shell.toml");
+    let mut scene = crate::common::scene_file("benches/hazards/shell.toml");
     holds("shell", &mut scene, [16, 16], 4096, 5.0e-3);
 }
 
 /// A ground of radius 1e6 under balls of 0.5.
 #[test]
 fn ground() {
-    let mut scene = common::scene_file("benches/hazards/ground-1e6.toml");
+    let mut scene = crate::common::scene_file("benches/hazards/ground-1e6.toml");
     holds("ground", &mut scene, [16, 16], 16_384, 3.0e-3);
 }

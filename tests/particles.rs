@@ -1,8 +1,6 @@
 //! Particle files on the command line and in scene files, through the program.
 
-mod cli_support;
-
-use cli_support::{Folder, GOOD, holds, mean};
+use crate::cli_support::{Folder, GOOD, holds, mean};
 
 /// Three atoms of water in a row with a fourth that is no element.
 const WATER: &str = "4\nProperties=species:S:1:pos:R:3:q:R:1\nO 0 0 0 -0.8\nH 1 0 0 0.4\nH -1 0 0 0.4\nXx 0 5 0 0\n";

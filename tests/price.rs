@@ -1,20 +1,16 @@
 //! Forecasts: what `price` says against what renders do.
 
-mod cli_support;
-mod common;
-mod thorough;
-
 use std::time::Duration;
 
-use cli_support::{BLACK, Folder, holds};
-use common::{gpu_renderer, job, scene_file};
+use crate::cli_support::{BLACK, Folder, holds};
+use crate::common::{gpu_renderer, job, scene_file};
+use crate::thorough::thorough;
 use gpu_trace::forecast::{self, Pilot};
 use gpu_trace::render::render_quietly;
 use gpu_trace::sampler::Sampler;
 use gpu_trace::settings::Settings;
 use gpu_trace::verify::settings;
 use serde_json::Value;
-use thorough::thorough;
 
 /// The shortest pilot: of what it needs at least.
 fn pilot(name: &str, settings: &Settings) -> Pilot {

@@ -1,11 +1,9 @@
 //! Light sampling by projected solid angle: areas against the closed form, a quadrature and the twin,
 //! directions by chi-square tests in every position of a light to the horizon.
 
-mod common;
-
 use std::f64::consts::PI;
 
-use common::{Wall, probe, walled};
+use crate::common::{Wall, probe, walled};
 use glam::{DVec2, DVec3};
 use gpu_trace::reference::light::aim::{Aim, aim_center};
 use gpu_trace::reference::light::projected::{

@@ -1,12 +1,8 @@
 //! Images against references of Mitsuba 3 (`tests/references/make.py`).
 
-mod common;
-mod equivalence;
-mod thorough;
-
 use std::path::Path;
 
-use equivalence::{Demand, Independent, check};
+use crate::equivalence::{Demand, Independent, check};
 use gpu_trace::input::read;
 
 /// Samples a pixel, in the short form and in the long one: the interval of the bias is a twentieth of a
@@ -23,7 +19,7 @@ fn reference(name: &str, part: &str) -> ([u32; 2], Vec<[f64; 3]>) {
 }
 
 fn holds(name: &str) {
-    let scene = common::scene_file(format!("tests/references/{name}.toml"));
+    let scene = crate::common::scene_file(format!("tests/references/{name}.toml"));
     let (size, mean) = reference(name, "mean");
     assert_eq!(size, [scene.width, scene.height]);
     let other = Independent {
@@ -32,7 +28,7 @@ fn holds(name: &str) {
         samples: 131_072.0,
     };
     let demand = Demand {
-        spp: SPP[usize::from(thorough::thorough())],
+        spp: SPP[usize::from(crate::thorough::thorough())],
         equivalent: 1.0e-3,
     };
     check(name, &scene, &other, demand);

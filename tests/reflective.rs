@@ -2,11 +2,9 @@
 //! someone else's arithmetic (`references/reflective.py`). What every material has to pass is in
 //! `materials.rs` and `distribution.rs`.
 
-mod common;
-
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use common::gpu;
+use crate::common::gpu;
 use glam::DVec3;
 use gpu_trace::gpu::bsdf_probe::{BsdfInput, BsdfProbe, Sampled};
 use gpu_trace::materials::reflective::Reflective;

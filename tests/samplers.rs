@@ -1,10 +1,7 @@
 //! Both samplers: the same image, true error bars, the same paths on device and host, and samples that
 //! are a function of seed, pixel and index alone.
 
-mod common;
-mod thorough;
-
-use common::{gpu_renderer, render_cpu, render_gpu, scene_file};
+use crate::common::{gpu_renderer, render_cpu, render_gpu, scene_file};
 use glam::DVec3;
 use gpu_trace::film::{Film, window_end};
 use gpu_trace::gpu::renderer::DispatchLimits;
@@ -81,9 +78,9 @@ fn error_bars_are_true() {
     for sampler in SAMPLERS {
         // Scrambles of 4, of 4 and 16, and in the long form of all lengths.
         let all: &[u64] = &[64, 256, 512];
-        for &spp in &all[..if thorough::thorough() { 3 } else { 2 }] {
+        for &spp in &all[..if crate::thorough::thorough() { 3 } else { 2 }] {
             let (z, ratio) = bars(400, |seed| {
-                let film = render_cpu(&scene, &small(&scene, sampler, spp, seed));
+                let film = render_gpu(&scene, &small(&scene, sampler, spp, seed));
                 let of = |i| {
                     let variance = film.variance_of_mean(i).expect("16 batches");
                     (DVec3::from(film.mean(i)), gray(variance))

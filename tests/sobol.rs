@@ -1,9 +1,7 @@
 //! The points of the sampler `sobol`: the same bits in WGSL and in Rust, nets after every scramble,
 //! uniform numbers, and nothing in common between vertices, scrambles and pixels.
 
-mod common;
-
-use common::probe;
+use crate::common::probe;
 use gpu_trace::reference::core::random::{random_words, sample_key, unit_float};
 use gpu_trace::reference::core::sobol::{
     owen_scramble, shuffled, sobol_point, sobol_words, sobol4,

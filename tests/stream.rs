@@ -1,8 +1,6 @@
 //! The sample stream: the same bits in WGSL and in Rust, and uniform, independent numbers.
 
-mod common;
-
-use common::probe;
+use crate::common::probe;
 use gpu_trace::reference::core::random::{mix_bits, sample_key, unit_float};
 use gpu_trace::settings::stream_words;
 use gpu_trace::statistics::{SIGNIFICANCE, correlation, sidak, uniform_ks};

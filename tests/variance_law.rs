@@ -9,9 +9,7 @@
 //! pairs: 1/(1 - q) (1 + 2 rho/(1 - rho)). The other way is that L = 1 + w L', which gives
 //! E L^2 = 1 + 2 rho m + q E L^2 with m = E L = 1/(1 - rho): the same.
 
-mod common;
-
-use common::{job, render_cpu, render_gpu, scene};
+use crate::common::{job, render_cpu, render_gpu, scene};
 use gpu_trace::film::Film;
 use gpu_trace::sampler::Sampler;
 use gpu_trace::scene::Scene;

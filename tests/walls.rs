@@ -1,11 +1,9 @@
 //! Lamps with a pole frame as a vertex sees them: half angle, projected solid angle and directions keep the
 //! digits of the gap, whatever the radius.
 
-mod common;
-
 use std::f64::consts::PI;
 
-use common::{probe, walled};
+use crate::common::{probe, walled};
 use glam::{DVec2, DVec3};
 use gpu_trace::reference::light::aim::{Aim, aim_center, aim_pole, cone_height};
 use gpu_trace::reference::light::projected::{cap_seen, sample_cap};

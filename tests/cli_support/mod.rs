@@ -1,5 +1,4 @@
 //! What the tests of the program share: a folder to run it in, and what comes out of a run.
-#![expect(dead_code, reason = "each test binary uses a part of it")]
 
 use std::collections::BTreeMap;
 use std::fs;

@@ -1,5 +1,4 @@
 //! What the GPU tests share: a device, kernels for any set of effects, and statistics.
-#![expect(dead_code, reason = "each test binary uses a part of it")]
 
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;

@@ -11,7 +11,7 @@ use resvg::usvg::{Options, Tree};
 use serde_json::{Value, json};
 
 use super::SMALL;
-use super::cli_support::Folder;
+use crate::cli_support::Folder;
 
 /// That every element is closed, in order, as HTML and SVG want it.
 pub(crate) fn balanced(text: &str) {

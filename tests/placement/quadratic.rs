@@ -9,7 +9,7 @@ use gpu_trace::placement::media::precedes;
 use gpu_trace::placement::{Media, Medium, Side};
 use gpu_trace::scene::{Scene, Sphere};
 
-use crate::Answers;
+use super::Answers;
 
 const ROUNDING: f64 = 4.0 * f64::EPSILON;
 const CLOSE: f64 = 1.0 / 1024.0;

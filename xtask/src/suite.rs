@@ -1,6 +1,6 @@
-//! The executables of the tests: which there are, and running them side by side.
+//! The tests by their files: which there are, and running these side by side.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 use std::io::{BufRead as _, BufReader, Write as _};
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
@@ -12,14 +12,31 @@ use serde_json::Value;
 use crate::cargo;
 use crate::drivers::Driver;
 
-/// An executable of tests.
+/// The tests of a file, which run in a process of their own.
 #[derive(Clone, Debug)]
 pub(crate) struct Tests {
-    /// The name of its file in `tests/`, or of the crate whose own tests it has.
+    /// The name of the file in `tests/`, or of the crate whose own tests these are.
     pub(crate) name: String,
     program: PathBuf,
-    /// The folder of its package, where cargo runs it.
+    /// The folder of the package, where cargo runs its tests.
     folder: PathBuf,
+    /// Their full names.
+    cases: Vec<String>,
+    /// How many [`Tests::retain`] has left out.
+    filtered: u64,
+}
+
+impl Tests {
+    /// Keeps the tests for whose full names `keep` holds.
+    pub(crate) fn retain(&mut self, keep: impl Fn(&str) -> bool) {
+        let before = self.cases.len();
+        self.cases.retain(|case| keep(case));
+        self.filtered += (before - self.cases.len()) as u64;
+    }
+
+    pub(crate) fn is_empty(&self) -> bool {
+        self.cases.is_empty()
+    }
 }
 
 /// What is run on one driver.
@@ -27,8 +44,9 @@ pub(crate) struct Part {
     pub(crate) driver: Driver,
     /// What the program says that it runs on.
     pub(crate) adapter: String,
-    /// Executables, each with what filters its tests.
-    pub(crate) tests: Vec<(Tests, Vec<String>)>,
+    pub(crate) tests: Vec<Tests>,
+    /// Further arguments of their harness.
+    pub(crate) options: Vec<String>,
     /// What the program is asked after that: each must exit with 0.
     pub(crate) commands: Vec<Command>,
 }
@@ -40,7 +58,7 @@ pub(crate) struct Count {
     pub(crate) failed: u64,
     pub(crate) ignored: u64,
     pub(crate) filtered: u64,
-    /// Of all its executables together.
+    /// Of all its processes together.
     pub(crate) seconds: f64,
     /// Why it has not held.
     pub(crate) faults: Vec<String>,
@@ -49,7 +67,7 @@ pub(crate) struct Count {
 /// Builds the tests that `arguments` of `cargo test` choose.
 ///
 /// # Errors
-/// If they do not compile.
+/// If they do not compile, or do not tell their names.
 pub(crate) fn build(arguments: &[&str]) -> Result<Vec<Tests>, String> {
     let shown = format!("cargo test --no-run {}", arguments.join(" "));
     eprintln!("$ {shown}");
@@ -71,24 +89,55 @@ pub(crate) fn build(arguments: &[&str]) -> Result<Vec<Tests>, String> {
         let Ok(message) = serde_json::from_str(&line.map_err(failed)?) else {
             continue;
         };
-        all.extend(tests(&message));
+        all.extend(executable(&message));
     }
     match child.wait() {
-        Ok(status) if status.success() => Ok(all),
-        Ok(status) => Err(format!("{shown}: {status}")),
-        Err(error) => Err(failed(error)),
+        Ok(status) if status.success() => {}
+        Ok(status) => return Err(format!("{shown}: {status}")),
+        Err(error) => return Err(failed(error)),
     }
+    let mut files = Vec::new();
+    for tests in all {
+        let listed = Command::new(&tests.program)
+            .args(["--list", "--format", "terse"])
+            .output();
+        let listed = listed.map_err(|e| format!("{}: {e}", tests.program.display()))?;
+        files.extend(by_file(&tests, &String::from_utf8_lossy(&listed.stdout)));
+    }
+    Ok(files)
 }
 
-/// The executable of tests that cargo tells of in `message`, if it does.
-fn tests(message: &Value) -> Option<Tests> {
+/// The executable of tests that cargo tells of in `message`, if it does; its tests are not known yet.
+fn executable(message: &Value) -> Option<Tests> {
     let program = message["executable"].as_str()?;
     let manifest = PathBuf::from(message["manifest_path"].as_str()?);
     message["profile"]["test"].as_bool()?.then_some(Tests {
         name: message["target"]["name"].as_str()?.to_owned(),
         program: program.into(),
         folder: manifest.parent()?.into(),
+        cases: Vec::new(),
+        filtered: 0,
     })
+}
+
+/// The tests that an executable lists as `NAME: test`; those of the one of `tests/` by their files, which
+/// are its modules.
+fn by_file(executable: &Tests, listed: &str) -> Vec<Tests> {
+    let cases = listed.lines().filter_map(|l| l.strip_suffix(": test"));
+    let mut files: BTreeMap<&str, Vec<String>> = BTreeMap::new();
+    for case in cases {
+        let name = match executable.name.as_str() {
+            "tests" => case.split("::").next().unwrap_or(case),
+            name => name,
+        };
+        files.entry(name).or_default().push(case.to_owned());
+    }
+    let tests = files.into_iter().map(|(name, cases)| Tests {
+        name: name.to_owned(),
+        cases,
+        ..executable.clone()
+    });
+    tests.collect()
 }
 
 /// What a worker does next.
@@ -104,8 +153,9 @@ pub(crate) fn run(parts: Vec<Part>, variable: Option<(&str, &str)>) -> Vec<Count
     let counts: Vec<Mutex<Count>> = parts.iter().map(|_| Mutex::default()).collect();
     let mut queue = VecDeque::new();
     for (i, part) in parts.into_iter().enumerate() {
-        for (tests, filters) in part.tests {
-            queue.push_back((i, part.driver.clone(), Job::Tests(tests, filters)));
+        for tests in part.tests {
+            let job = Job::Tests(tests, part.options.clone());
+            queue.push_back((i, part.driver.clone(), job));
         }
         for command in part.commands {
             queue.push_back((i, part.driver.clone(), Job::Command(command)));
@@ -135,21 +185,23 @@ pub(crate) fn run(parts: Vec<Part>, variable: Option<(&str, &str)>) -> Vec<Count
 
 /// Runs a job to its end, and shows what it wrote.
 fn one(driver: &Driver, job: Job, variable: Option<(&str, &str)>) -> Count {
-    let (name, mut command, has_tests) = match job {
+    let (name, mut command, filtered) = match job {
         Job::Command(command) => {
             let arguments: Vec<_> = command.get_args().map(|a| a.to_string_lossy()).collect();
-            (format!("gpu-trace {}", arguments.join(" ")), command, false)
+            (format!("gpu-trace {}", arguments.join(" ")), command, None)
         }
-        Job::Tests(tests, filters) => {
+        Job::Tests(tests, options) => {
             let mut command = Command::new(&tests.program);
             command
-                .args(filters)
+                .arg("--exact")
+                .args(options)
+                .args(tests.cases)
                 .current_dir(&tests.folder)
                 .env("CARGO_MANIFEST_DIR", &tests.folder);
             if std::env::var_os("RUST_TEST_THREADS").is_none() {
                 command.env("RUST_TEST_THREADS", "1");
             }
-            (tests.name, command, true)
+            (tests.name, command, Some(tests.filtered))
         }
     };
     let name = format!("{name} on {}", driver.name);
@@ -171,16 +223,20 @@ fn one(driver: &Driver, job: Job, variable: Option<(&str, &str)>) -> Count {
             // A closed pipe is no fault of the tests.
             let _ = std::io::stdout().lock().write_all(&shown);
             let text = String::from_utf8_lossy(&output.stdout);
-            let result = text.lines().find_map(|l| l.strip_prefix("test result: "));
+            // The last: tests may show what others have come to.
+            let result = text
+                .lines()
+                .rev()
+                .find_map(|l| l.strip_prefix("test result: "));
             if let Some(result) = result {
                 count.passed = number(result, "passed");
                 count.failed = number(result, "failed");
                 count.ignored = number(result, "ignored");
-                count.filtered = number(result, "filtered");
+                count.filtered = filtered.unwrap_or(0);
             }
             if !output.status.success() {
                 count.faults.push(format!("{name}: {}", output.status));
-            } else if has_tests && result.is_none() {
+            } else if filtered.is_some() && result.is_none() {
                 count.faults.push(format!("{name}: it says no result"));
             }
         }
@@ -213,7 +269,7 @@ mod tests {
 
     use serde_json::json;
 
-    use super::{Part, Tests, number, run, tests};
+    use super::{Part, Tests, by_file, executable, number, run};
     use crate::drivers::Driver;
 
     #[test]
@@ -230,10 +286,44 @@ mod tests {
             "executable": "/t/faults-1", "manifest_path": "/p/Cargo.toml",
             "profile": { "test": true }, "target": { "name": "faults" },
         });
-        let found = tests(&message).expect("an executable");
+        let found = executable(&message).expect("an executable");
         assert_eq!((found.name.as_str(), found.folder), ("faults", "/p".into()));
         message["profile"]["test"] = json!(false);
-        assert!(tests(&message).is_none(), "the program itself has no tests");
+        assert!(
+            executable(&message).is_none(),
+            "the program itself has no tests"
+        );
+    }
+
+    #[test]
+    fn tests_are_told_by_their_files() {
+        let listed =
+            "aov::a: test\nconverge::shown::b: test\naov::c: test\n\n3 tests, 0 benchmarks\n";
+        let names = |name: &str| -> Vec<(String, usize)> {
+            let executable = tests(name, &[]);
+            let files = by_file(&executable, listed).into_iter();
+            files.map(|t| (t.name, t.cases.len())).collect()
+        };
+        assert_eq!(names("tests"), [("aov".into(), 2), ("converge".into(), 1)]);
+        assert_eq!(names("gpu_trace"), [("gpu_trace".into(), 3)]);
+    }
+
+    #[test]
+    fn what_is_left_out_is_counted() {
+        let mut some = tests("some", &["a", "b", "ab"]);
+        some.retain(|case| case.contains('a'));
+        assert_eq!((some.cases.len(), some.filtered), (2, 1));
+    }
+
+    /// Tests of this executable.
+    fn tests(name: &str, cases: &[&str]) -> Tests {
+        Tests {
+            name: name.into(),
+            program: std::env::current_exe().expect("the test's own path"),
+            folder: ".".into(),
+            cases: cases.iter().map(|&case| case.to_owned()).collect(),
+            filtered: 0,
+        }
     }
 
     /// A part whose only executable is this one, of which it runs the test of that name.
@@ -241,14 +331,8 @@ mod tests {
         Part {
             driver: Driver::system(),
             adapter: String::new(),
-            tests: vec![(
-                Tests {
-                    name: "xtask".into(),
-                    program: std::env::current_exe().expect("the test's own path"),
-                    folder: ".".into(),
-                },
-                vec!["--exact".into(), name.into()],
-            )],
+            tests: vec![tests("xtask", &[name])],
+            options: Vec::new(),
             commands: Vec::new(),
         }
     }
@@ -261,12 +345,11 @@ mod tests {
             ..part("no test of this name")
         };
         let mut bad = part("suite::tests::results_are_counted");
-        bad.tests[0].1.push("--no-such-option".into());
+        bad.options.push("--no-such-option".into());
         let [good, missing, bad] = &run(vec![good, missing, bad], None)[..] else {
             panic!("three parts");
         };
         assert_eq!((good.passed, good.failed, good.faults.len()), (1, 0, 0));
-        assert!(good.filtered > 0, "{good:?}");
         assert_eq!((missing.passed, missing.faults.len()), (0, 1));
         assert!(
             missing.faults[0].contains("/no/such/program") || missing.faults[0].contains("No such")

@@ -8,7 +8,7 @@ use crate::suite::{self, Count, Part, Tests};
 use crate::{lints, program};
 
 const USAGE: &str = "\
-Usage: cargo xtask test [--all] [--drivers] [ARGUMENTS OF CARGO TEST...] [-- ARGUMENTS OF THE TESTS...]
+Usage: cargo xtask test [--all] [--drivers] [ARGUMENTS OF CARGO TEST...] [-- PARTS OF NAMES... OPTIONS...]
 
 Format, lints, documentation; all tests on Mesa lavapipe, which is installed if need be; then those
 that another driver may answer differently on SwiftShader and on llvmpipe through GL, where these are
@@ -18,7 +18,8 @@ alone.
   --all       the long forms of the tests, and all of them on every driver
   --drivers   install the drivers that are missing; it is an error if one cannot be
 
-Further arguments choose tests, the same on every driver: `--test faults -- memory`, say.
+Further arguments choose tests, the same on every driver, and options of their harness: `-- faults::memory
+--nocapture`, say, or `--lib`.
 ";
 
 /// Set to 1 for tests that have a long form.
@@ -105,7 +106,8 @@ pub(crate) fn all(arguments: &[String]) -> Result<(), String> {
     if chosen.first().is_some_and(|a| !a.starts_with('-')) {
         return Err(format!("parts of names of tests come after `--`\n{USAGE}"));
     }
-    let filters: Vec<String> = filters.iter().skip(1).map(|a| (*a).to_owned()).collect();
+    let (options, filters): (Vec<&str>, Vec<&str>) =
+        (filters.iter().skip(1)).partition(|a| a.starts_with('-'));
 
     let (driver, alone) = first()?;
     lints::all()?;
@@ -119,6 +121,7 @@ pub(crate) fn all(arguments: &[String]) -> Result<(), String> {
     let part = |driver, adapter, elsewhere| Part {
         commands: commands(long),
         tests: choose(&tests, &filters, elsewhere),
+        options: options.iter().map(|&o| o.to_owned()).collect(),
         driver,
         adapter,
     };
@@ -162,30 +165,26 @@ fn there(optional: Optional, install: bool) -> Result<(Driver, String), String> 
     found.ok_or_else(|| "`cargo xtask test --drivers` installs it".into())
 }
 
-/// What of `tests` runs on a driver, the longest first; `elsewhere`: on one that is not the first.
-fn choose(tests: &[Tests], filters: &[String], elsewhere: bool) -> Vec<(Tests, Vec<String>)> {
-    let mut chosen: Vec<(Tests, Vec<String>)> = tests
+/// What of `tests` runs on a driver, the longest first: of all names that contain one of `filters`, if there
+/// are any; `elsewhere`: on a driver that is not the first.
+fn choose(tests: &[Tests], filters: &[&str], elsewhere: bool) -> Vec<Tests> {
+    let any = |case: &str, parts: &[&str]| parts.iter().any(|part| case.contains(part));
+    let mut chosen: Vec<Tests> = tests
         .iter()
         .filter(|tests| !elsewhere || !ONCE.contains(&tests.name.as_str()))
-        .map(|tests| {
-            let part = PARTLY
-                .iter()
-                .find(|(name, _)| elsewhere && *name == tests.name);
-            let mut filters = filters.to_vec();
-            if elsewhere {
-                filters.extend(part.map(|(_, filter)| (*filter).to_owned()));
-                filters.extend(
-                    SKIPPED
-                        .iter()
-                        .flat_map(|name| ["--skip", name])
-                        .map(String::from),
-                );
-            }
-            (tests.clone(), filters)
-        })
+        .cloned()
         .collect();
+    for tests in &mut chosen {
+        let part = PARTLY.iter().find(|(name, _)| *name == tests.name);
+        tests.retain(|case| filters.is_empty() || any(case, filters));
+        if elsewhere {
+            tests.retain(|case| !any(case, &SKIPPED));
+            tests.retain(|case| part.is_none_or(|(_, part)| case.contains(part)));
+        }
+    }
+    chosen.retain(|tests| !tests.is_empty());
     let rank = |name: &str| LONGEST.iter().position(|l| *l == name);
-    chosen.sort_by_key(|(tests, _)| rank(&tests.name).unwrap_or(LONGEST.len()));
+    chosen.sort_by_key(|tests| rank(&tests.name).unwrap_or(LONGEST.len()));
     chosen
 }
 
@@ -253,8 +252,24 @@ mod tests {
         let partly = PARTLY.iter().map(|(name, _)| name);
         for name in ONCE.iter().chain(partly).chain(&LONGEST) {
             let place = root().join("tests").join(name);
-            let there = place.with_extension("rs").exists() || place.join("main.rs").exists();
+            let there = place.with_extension("rs").exists() || place.join("mod.rs").exists();
             assert!(there || ["gpu_trace", "xtask"].contains(name), "{name}");
+        }
+    }
+
+    /// A file that is no module of `tests/main.rs` would not run, in silence.
+    #[test]
+    fn all_files_are_modules() {
+        let folder = root().join("tests");
+        let main = std::fs::read_to_string(folder.join("main.rs")).expect("tests/main.rs");
+        for entry in std::fs::read_dir(folder).expect("tests/") {
+            let path = entry.expect("an entry of tests/").path();
+            let is_module =
+                path.join("mod.rs").exists() || path.extension().is_some_and(|e| e == "rs");
+            let name = path.file_stem().expect("a name").to_string_lossy();
+            if is_module && name != "main" {
+                assert!(main.contains(&format!("\nmod {name};\n")), "{name}");
+            }
         }
     }
 

@@ -1,13 +1,11 @@
 //! `gpu-trace converge` from its options to its files.
 
-#[path = "../cli_support/mod.rs"]
-mod cli_support;
 mod shown;
 
 use std::collections::BTreeMap;
 use std::fs;
 
-use cli_support::{BLACK, Background, Folder, holds};
+use crate::cli_support::{BLACK, Background, Folder, holds};
 use gpu_trace::input::read;
 use serde_json::{Value, json};
 use shown::{balanced, drawn, self_contained};
