@@ -5,6 +5,7 @@
 //! one, those of all scenes, and a random sample of the rest, all completed by what their effects need.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::{Arc, Mutex};
 
 use crate::common::{scene_file, scene_files};
 use glam::DVec3;
@@ -231,8 +232,20 @@ struct Linked {
     fault: Option<String>,
 }
 
-/// Links both stages for a set. Its scene asks for it, or, where no scene does, for nearly it.
-fn linked(set: &Set) -> Linked {
+/// Links both stages for a set, once for all tests. Its scene asks for it, or, where no scene does, for nearly
+/// it.
+fn linked(set: &Set) -> Arc<Linked> {
+    static ALL: Mutex<BTreeMap<Set, Arc<Linked>>> = Mutex::new(BTreeMap::new());
+    let known = ALL.lock().expect("no test panics here").get(set).cloned();
+    known.unwrap_or_else(|| {
+        let linked = Arc::new(link_set(set));
+        let mut all = ALL.lock().expect("no test panics here");
+        all.insert(set.clone(), linked.clone());
+        linked
+    })
+}
+
+fn link_set(set: &Set) -> Linked {
     let (scene, settings) = asking_for(set);
     let placement =
         Placement::with_offset(&scene, settings.width, settings.height, settings.offset);
@@ -317,8 +330,8 @@ fn wrong_names(names: &BTreeSet<String>, effects: &Effects) -> Option<String> {
 }
 
 /// Links all sets; none may be faulty.
-fn check(sets: &BTreeSet<Set>) -> Vec<(Set, Linked)> {
-    let all: Vec<(Set, Linked)> = sets
+fn check(sets: &BTreeSet<Set>) -> Vec<(Set, Arc<Linked>)> {
+    let all: Vec<(Set, Arc<Linked>)> = sets
         .par_iter()
         .map(|set| (set.clone(), linked(set)))
         .collect();
@@ -444,7 +457,7 @@ fn every_set_in_the_scenes() {
 
 /// Names in modules, and members, that came with the same effects every time and that none of these has for
 /// its own. What functions declare within them goes with them.
-fn unmarked(all: &[(Set, Linked)]) -> BTreeMap<&str, Set> {
+fn unmarked(all: &[(Set, Arc<Linked>)]) -> BTreeMap<&str, Set> {
     let mut with: BTreeMap<&str, Set> = BTreeMap::new();
     for (set, linked) in all {
         for name in &linked.names {
