@@ -11,7 +11,7 @@ use std::process::{Command, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use crate::cli_support::{Background, Folder, Run, bits, holds};
+use crate::cli_support::{Background, Folder, Run, bits, full_name, holds};
 use gpu_trace::error::Error;
 use gpu_trace::gpu::renderer::GpuRenderer;
 use gpu_trace::image::{Format, Picture};
@@ -557,7 +557,7 @@ fn kill_writers(
         }
         let mut command = Command::new(std::env::current_exe().expect("the test's own path"));
         command
-            .args(["--exact", test])
+            .args(["--exact", &full_name(module_path!(), test)])
             .env(WRITER[0], folder.path(""))
             .stdout(Stdio::null())
             .stderr(Stdio::null());

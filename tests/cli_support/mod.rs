@@ -312,3 +312,9 @@ pub(crate) fn holds(text: &str, parts: &[&str]) {
         assert!(text.contains(part), "no {part:?} in:\n{text}");
     }
 }
+
+/// The name by which this executable knows the test `name` of a `module_path!()`.
+pub(crate) fn full_name(module: &str, name: &str) -> String {
+    let (_, module) = module.split_once("::").expect("the crate is before it");
+    format!("{module}::{name}")
+}

@@ -4,6 +4,7 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use crate::cli_support::full_name;
 use gpu_trace::error::{Action, Error};
 use gpu_trace::image::Format;
 use gpu_trace::output::{Metadata, Target, atomic, check_all, write_all};
@@ -243,11 +244,14 @@ mod unix {
         let child = Command::new("sh")
             .args(["-c", "trap '' XFSZ; ulimit -f 8; exec \"$0\" \"$@\""])
             .arg(std::env::current_exe().expect("the test's own path"))
-            .args(["--exact", "targets::unix::a_full_disk_leaves_the_old_file"])
+            .arg("--exact")
+            .arg(full_name(module_path!(), "a_full_disk_leaves_the_old_file"))
             .env(CHILD, &path)
             .output()
             .expect("a shell");
         assert!(child.status.success(), "{child:?}");
+        let shown = String::from_utf8_lossy(&child.stdout);
+        assert!(shown.contains("1 passed"), "{shown}");
         assert_eq!(file_names(directory.path()), ["old.npy"]);
         assert_eq!(fs::read(&path).expect("a file"), b"old");
     }
