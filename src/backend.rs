@@ -117,11 +117,7 @@ impl Backend {
     /// Bytes of this program's memory that a pixel takes in a render, at most.
     #[must_use]
     pub fn pixel_bytes(&self, settings: &Settings) -> usize {
-        let aovs = if settings.has_aovs() {
-            size_of::<AovSums>()
-        } else {
-            0
-        };
+        let aovs = aov_bytes(settings);
         let window = size_of::<PixelSums>() + aovs;
         // The pilot has a film of its own.
         let films = if settings.adaptive { 2 } else { 1 };
@@ -133,8 +129,31 @@ impl Backend {
             Self::Cpu { .. } if aovs > 0 => renderer::PIXEL_BYTES + aovs + 16,
             Self::Cpu { .. } => renderer::PIXEL_BYTES,
         };
-        let layers = if aovs > 0 { MOST_LAYERS } else { FEWEST_LAYERS };
-        film + (window + renderer).max(file_bytes(layers))
+        film + (window + renderer).max(file_bytes(layers(settings)))
+    }
+}
+
+/// Bytes of this program's memory that a pixel takes while films are joined: the sum, and either another film or
+/// the image files.
+#[must_use]
+pub fn joined_pixel_bytes(settings: &Settings) -> usize {
+    let film = film::PIXEL_BYTES + aov_bytes(settings);
+    film + film.max(file_bytes(layers(settings)))
+}
+
+/// Bytes of what a pixel keeps beside its light.
+fn aov_bytes(settings: &Settings) -> usize {
+    match settings.has_aovs() {
+        true => size_of::<AovSums>(),
+        false => 0,
+    }
+}
+
+/// Values of a pixel in layers, at most.
+fn layers(settings: &Settings) -> usize {
+    match settings.has_aovs() {
+        true => MOST_LAYERS,
+        false => FEWEST_LAYERS,
     }
 }
 

@@ -88,6 +88,14 @@ fn suspects(settings: &Settings, tally: &Tally, paths: u64) -> Vec<Neutral> {
     all
 }
 
+/// The settings that may have removed light from a film, as options with their values: what [`audit`] would measure.
+#[must_use]
+pub fn suspected(settings: &Settings, film: &Film) -> Vec<String> {
+    let suspects = suspects(settings, film.tally(), film.paths());
+    let option = |neutral: Neutral| format!("{} {}", neutral.setting, neutral.value);
+    suspects.into_iter().map(option).collect()
+}
+
 /// Measures what each inexact setting of a finished job, which left `film`, removed; `None` if `go_on`
 /// said to stop. A scene that only the setting lets be rendered has nothing to compare with, which its
 /// entry says.

@@ -17,6 +17,7 @@
 //!    trace the same paths. [`backend`]: one of them, opened.
 //! 8. [`render`]: the loop that asks a renderer for windows of samples until a stop rule holds.
 //! 9. [`film`]: f64 sums and variances over all windows; mean and error; where further samples go.
+//!    [`film_file`]: films kept, to go on with or to join.
 //!    [`variance`]: whether samples can show their variance.
 //! 10. [`forecast`]: what an error will cost, from a pilot. [`ledger`]: how much light inexact settings
 //!     took.
@@ -37,6 +38,7 @@ pub mod compare;
 pub mod effects;
 pub mod error;
 pub mod film;
+pub mod film_file;
 pub mod forecast;
 pub mod gpu;
 pub mod image;

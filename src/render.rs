@@ -1,16 +1,22 @@
 //! The render loop: windows of samples from a renderer into the film until a stop rule holds.
 
+mod goal;
+mod keep;
+
 use std::ops::Range;
 use std::time::{Duration, Instant};
 
 use crate::error::Result;
 use crate::film::{
-    Allocation, BLOCK, Estimate, Film, LEAST_SAMPLES, PILOT_SAMPLES, Tiles, Window, next_look,
-    window_end,
+    Allocation, Estimate, Film, LEAST_SAMPLES, PILOT_SAMPLES, Tiles, Window, next_look, window_end,
 };
 use crate::job::Job;
 use crate::sampler::PILOT;
 use crate::settings::{Rect, Settings};
+
+use goal::end_of;
+pub(crate) use goal::{estimate, has_all};
+pub use keep::{Begun, Keep, State, StoppedBy};
 
 /// Renders windows of samples: the GPU or the CPU reference. What comes after does not know which.
 pub trait Renderer {
@@ -63,22 +69,6 @@ pub trait Control {
     }
 }
 
-/// What ended a render: whichever came first.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum StoppedBy {
-    /// All samples were taken.
-    Spp,
-    /// The error fell to what was asked for.
-    Error,
-    /// The time was up.
-    Time,
-    /// The user or the system said so.
-    Interrupt,
-    /// The renderer failed.
-    Failure,
-}
-
 /// Where a render is, for a progress display.
 #[derive(Clone, Copy, Debug)]
 pub struct Status {
@@ -120,16 +110,24 @@ pub struct Outcome {
 struct Loop<'a> {
     watch: &'a mut dyn Watch,
     begin: Instant,
+    /// Time that the render has taken before.
+    before: Duration,
     deadline: Option<Duration>,
     status: Status,
     /// Whether there is an image without the window in progress.
     kept: bool,
 }
 
+impl Loop<'_> {
+    fn elapsed(&self) -> Duration {
+        self.before + self.begin.elapsed()
+    }
+}
+
 impl Control for Loop<'_> {
     fn proceed(&mut self, paths: u64) -> bool {
         self.status.paths += paths;
-        self.status.elapsed = self.begin.elapsed();
+        self.status.elapsed = self.elapsed();
         self.watch.update(&self.status);
         !self.watch.interrupted() && self.has_time(Duration::ZERO)
     }
@@ -146,24 +144,34 @@ impl Control for Loop<'_> {
 /// Renders until all samples are done or a stop rule of the job's settings holds. Where its estimator
 /// claims no error bars no error is estimated, for the stop rule neither.
 pub fn render(renderer: &mut dyn Renderer, job: &Job, watch: &mut dyn Watch) -> Outcome {
-    run(
-        renderer,
-        job.settings(),
-        job.claims().has_error_bars(),
-        watch,
-    )
+    go_on(renderer, job, watch, None, None)
 }
 
-fn run(
-    renderer: &mut dyn Renderer,
-    settings: &Settings,
+/// The same from where a render is, if it has begun; it is kept from time to time.
+pub fn go_on<'a>(
+    renderer: &'a mut dyn Renderer,
+    job: &'a Job,
+    watch: &'a mut dyn Watch,
+    begun: Option<Begun>,
+    keep: Option<&'a mut dyn Keep>,
+) -> Outcome {
+    let error_bars = job.claims().has_error_bars();
+    run(renderer, job.settings(), error_bars, watch, begun, keep)
+}
+
+fn run<'a>(
+    renderer: &'a mut dyn Renderer,
+    settings: &'a Settings,
     error_bars: bool,
-    watch: &mut dyn Watch,
+    watch: &'a mut dyn Watch,
+    begun: Option<Begun>,
+    keep: Option<&'a mut dyn Keep>,
 ) -> Outcome {
     let pixels = settings.crop.pixels() as u64;
     let spp = settings.samples.end - settings.samples.start;
+    let has = |of: fn(&Film) -> u64| begun.as_ref().map_or(0, |begun| of(&begun.film));
     let status = Status {
-        paths: 0,
+        paths: has(Film::paths),
         total: spp.saturating_mul(pixels),
         elapsed: Duration::ZERO,
         error: None,
@@ -175,41 +183,23 @@ fn run(
         control: Loop {
             watch,
             begin: Instant::now(),
+            before: begun.as_ref().map_or(Duration::ZERO, |b| b.elapsed),
             deadline: settings.time,
             status,
-            kept: false,
+            kept: has(Film::samples) > 0,
         },
+        keep,
+        pilot: begun.as_ref().map_or(0, |begun| begun.pilot),
+        look: begun.as_ref().map_or(next_look(0), |begun| begun.look),
         failure: None,
     };
-    let mut film = Film::new(settings.crop);
-    let mut pilot = 0;
-    let stopped_by = if !settings.adaptive {
-        run.fill(&mut film, settings.samples.clone())
-    } else if let Err(stopped_by) = run.windows(&mut film, 0, 0..PILOT_SAMPLES.min(spp), PILOT) {
-        stopped_by
-    } else {
-        // The pilot is in no image. Else a tile that it finds dark by chance would get few samples, and
-        // stay too dark.
-        let left = spp.saturating_sub(PILOT_SAMPLES);
-        let allocation = Allocation::of(&film, left as f64 / LEAST_SAMPLES as f64);
-        let end = (left as f64 / allocation.mean_weight()) as u64 / BLOCK * BLOCK;
-        let mut image = Film::of(allocation);
-        let stopped_by = run.fill(&mut image, 0..end);
-        // As long as it has fewer samples, the pilot is the better image. What stopped it so early was not
-        // what it shows.
-        if image.samples() > 0 && image.mean_samples() >= film.mean_samples() {
-            pilot = film.samples();
-            image.count(film.tally(), film.paths());
-            film = image;
-        }
-        stopped_by
-    };
+    let (film, stopped_by) = run.all(begun);
     Outcome {
         estimate: run.estimate(&film),
+        pilot: run.pilot,
         film,
-        pilot,
         stopped_by,
-        elapsed: run.control.begin.elapsed(),
+        elapsed: run.control.elapsed(),
         failure: run.failure,
     }
 }
@@ -221,32 +211,78 @@ struct Run<'a> {
     /// Whether the spread of samples tells the error.
     error_bars: bool,
     control: Loop<'a>,
+    keep: Option<&'a mut dyn Keep>,
+    /// Samples a pixel of the pilot whose image the film is.
+    pilot: u64,
+    /// The number of samples at which the error is looked at next.
+    look: u64,
     failure: Option<crate::error::Error>,
 }
 
 impl Run<'_> {
     fn estimate(&self, film: &Film) -> Estimate {
-        let estimate = Estimate::of(film);
-        match self.error_bars {
-            true => estimate,
-            false => Estimate {
-                error: None,
-                error_at_most: None,
-                ..estimate
-            },
+        estimate(film, self.error_bars)
+    }
+
+    /// The image, from where it is if it has begun.
+    fn all(&mut self, begun: Option<Begun>) -> (Film, StoppedBy) {
+        let samples = self.settings.samples.clone();
+        let spp = samples.end - samples.start;
+        let finished = begun.as_ref().and_then(|begun| begun.finished);
+        if !self.settings.adaptive {
+            let mut film = begun.map_or_else(|| Film::new(self.settings.crop), |begun| begun.film);
+            let stopped_by = finished.unwrap_or_else(|| self.fill(&mut film, samples));
+            return (film, stopped_by);
         }
+        if let Some(begun) = begun {
+            let mut film = begun.film;
+            let end = end_of(&film, spp);
+            let stopped_by = finished.unwrap_or_else(|| self.fill(&mut film, 0..end));
+            return (film, stopped_by);
+        }
+        let mut pilot = Film::new(self.settings.crop);
+        if let Err(stopped_by) = self.windows(&mut pilot, 0, 0..PILOT_SAMPLES.min(spp), PILOT) {
+            return (pilot, stopped_by);
+        }
+        // The pilot is in no image. Else a tile that it finds dark by chance would get few samples, and
+        // stay too dark.
+        let left = spp.saturating_sub(PILOT_SAMPLES);
+        let allocation = Allocation::of(&pilot, left as f64 / LEAST_SAMPLES as f64);
+        let mut image = Film::of(allocation);
+        image.count(pilot.tally(), pilot.paths());
+        self.pilot = pilot.samples();
+        let end = end_of(&image, spp);
+        let stopped_by = self.fill(&mut image, 0..end);
+        // As long as it has fewer samples, the pilot is the better image. What stopped it so early was not
+        // what it shows.
+        if image.samples() > 0 && image.mean_samples() >= pilot.mean_samples() {
+            return (image, stopped_by);
+        }
+        self.pilot = 0;
+        (pilot, stopped_by)
     }
 
     /// Fills the film until the pixels of step 0 have the samples of `range`, or a stop rule holds:
-    /// those of step s are always 2^s times as far.
+    /// those of step s are always 2^s times as far. Begins after the samples that are in.
     fn fill(&mut self, film: &mut Film, range: Range<u64>) -> StoppedBy {
-        let mut start = range.start;
-        let mut look = next_look(0);
+        let stopped_by = self.fill_windows(film, range);
+        self.offer(film, Some(stopped_by));
+        stopped_by
+    }
+
+    fn fill_windows(&mut self, film: &mut Film, range: Range<u64>) -> StoppedBy {
         let counts = film.allocation().counts();
+        let steps: Vec<u8> = (0..film.steps())
+            .filter(|s| counts[usize::from(*s)] > 0)
+            .collect();
+        // A render that was stopped within a window goes on there, each step where it is.
+        let done = |film: &Film, step: u8| (range.start << step) + film.samples_of_step(step);
+        let least = steps.iter().map(|s| done(film, *s) >> s).min();
+        let mut start = least.unwrap_or(range.start);
         while start < range.end {
             let end = window_end(start, range.end);
-            for step in (0..film.steps()).filter(|s| counts[usize::from(*s)] > 0) {
-                let part = start << step..end << step;
+            for &step in &steps {
+                let part = done(film, step)..end << step;
                 if let Err(stopped_by) = self.windows(film, step, part, 0) {
                     return stopped_by;
                 }
@@ -255,15 +291,31 @@ impl Run<'_> {
             let estimate = self.estimate(film);
             self.control.status.error = estimate.error;
             // At sample counts that nothing seen so far decides.
-            if film.samples() >= look {
-                look = next_look(film.samples());
+            if film.samples() >= self.look {
+                self.look = next_look(film.samples());
                 let reached = |limit| estimate.error_at_most.is_some_and(|e| e <= limit);
                 if self.settings.error.is_some_and(reached) {
                     return StoppedBy::Error;
                 }
             }
+            if start < range.end {
+                self.offer(film, None);
+            }
         }
         StoppedBy::Spp
+    }
+
+    /// Lets the film be kept.
+    fn offer(&mut self, film: &Film, stopped_by: Option<StoppedBy>) {
+        if let Some(keep) = &mut self.keep {
+            keep.keep(&State {
+                film,
+                pilot: self.pilot,
+                look: self.look,
+                elapsed: self.control.elapsed(),
+                stopped_by,
+            });
+        }
     }
 
     /// Adds the windows of a range to the pixels of one step; `Err` if something stops that. `origin` is
@@ -281,8 +333,11 @@ impl Run<'_> {
             if self.control.watch.interrupted() {
                 return Err(StoppedBy::Interrupt);
             }
-            let begin = self.control.begin;
-            if self.settings.time.is_some_and(|t| begin.elapsed() >= t) {
+            if self
+                .settings
+                .time
+                .is_some_and(|t| self.control.elapsed() >= t)
+            {
                 return Err(StoppedBy::Time);
             }
             let samples = origin + start..origin + window_end(start, range.end);
@@ -324,7 +379,7 @@ pub fn render_quietly(renderer: &mut dyn Renderer, settings: &Settings) -> Resul
             false
         }
     }
-    let mut outcome = run(renderer, settings, true, &mut Quiet);
+    let mut outcome = run(renderer, settings, true, &mut Quiet, None, None);
     match outcome.failure.take() {
         Some(error) => Err(error),
         None => Ok(outcome),

@@ -286,6 +286,29 @@ fn a_disk_that_fills_up_leaves_the_old_files() {
     assert_eq!(folder.npy("r.npy").pixels.len(), 4096);
 }
 
+#[test]
+fn a_film_file_that_has_no_room_leaves_the_old_one() {
+    let folder = Folder::new();
+    let arguments = "--size 16x16 --backend cpu --threads 1 -o k.npy";
+    folder.ok(&format!("{arguments} --spp 16 --checkpoint k.film"));
+    let film = folder.read("k.film");
+    let run = limited(
+        &folder,
+        "ulimit -f 16",
+        "resume k.film --spp 300 --checkpoint-every 1ms",
+    );
+    assert_eq!(run.code, Some(1), "{run:?}");
+    let [said, warned] =
+        ["error", "warning"].map(|what| format!("{what}: cannot write k.film: File too large"));
+    holds(&run.stderr, &[&said, &warned]);
+    assert!(folder.read("k.film") == film);
+    assert_eq!(temporaries(&folder.path("")).len(), 0);
+    // The image has what is in no film file.
+    let image = folder.read("k.npy");
+    folder.ok("resume k.film --spp 300");
+    assert_eq!(folder.read("k.npy"), image);
+}
+
 /// A file system of its own, where the system lets us mount one.
 #[cfg(target_os = "linux")]
 #[test]

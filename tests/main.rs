@@ -25,6 +25,7 @@ mod determinism;
 mod distribution;
 mod effects;
 mod faults;
+mod film_files;
 mod functions;
 mod functions_scene;
 mod furnace;

@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::path::PathBuf;
 use std::time::Duration;
 
-use clap::Args;
+use clap::{Args, Parser};
 use glam::DVec3;
 
 use super::choices::{self, Wanted};
@@ -15,7 +15,7 @@ use crate::error::{Error, Result};
 use crate::output::{Aov, ProgressMode};
 use crate::sampler::Sampler;
 use crate::scene::particles::Map;
-use crate::scene::particles::direct::Look;
+use crate::scene::particles::look::Look;
 use crate::scene::{Loaded, MAX_BOUNCES, Scene, builtin};
 use crate::settings::{
     DEFAULT_TERMINATION, GeometryChoice, Integrator, LightSampling, MAXIMUM_SPP, Offset, Rect,
@@ -73,6 +73,19 @@ pub struct RenderArgs {
         help = "Write the kernel as plain WGSL before rendering"
     )]
     pub dump_wgsl: Option<PathBuf>,
+    #[arg(
+        long,
+        value_name = "FILE",
+        help_heading = "Output",
+        help = "Keep all sums in this new film file: `resume` goes on from there, `merge` joins parts"
+    )]
+    pub checkpoint: Option<PathBuf>,
+    #[arg(
+        long, value_name = "TIME", value_parser = values::time, allow_hyphen_values = true,
+        requires = "checkpoint", help_heading = "Output",
+        help = "How often to write the film file [default: 60s]"
+    )]
+    pub checkpoint_every: Option<Duration>,
     #[arg(
         long,
         help_heading = "Output",
@@ -297,7 +310,21 @@ pub struct RenderArgs {
     pub inject_fault: Option<Fault>,
 }
 
+/// The options of `render`, as a command of their own.
+#[derive(Parser)]
+struct Alone {
+    #[command(flatten)]
+    render: RenderArgs,
+}
+
 impl RenderArgs {
+    /// Those of a command line without any.
+    pub(super) fn none() -> Result<Self> {
+        Alone::try_parse_from(["gpu-trace"])
+            .map(|alone| alone.render)
+            .map_err(|error| Error::Usage(error.to_string()))
+    }
+
     /// The scene.
     ///
     /// # Errors
@@ -403,36 +430,4 @@ impl RenderArgs {
         }
         Ok(())
     }
-}
-
-/// The options of `check`.
-#[derive(Clone, Debug, Args)]
-pub(super) struct CheckArgs {
-    /// Only this case, by number or part of its name; may be repeated.
-    #[arg(long, value_name = "NAME", allow_hyphen_values = true,
-          value_parser = clap::builder::NonEmptyStringValueParser::new())]
-    pub(super) case: Vec<String>,
-    /// Fewer trials: under a minute without a GPU.
-    #[arg(long)]
-    pub(super) quick: bool,
-    /// Print JSON.
-    #[arg(long)]
-    pub(super) json: bool,
-    /// Say what each case sets up, and where its worst error is.
-    #[arg(short, long)]
-    pub(super) verbose: bool,
-    /// How paths leave a surface: exact, or to see what fails then none, back:X, out:X, ulp.
-    #[arg(
-        long,
-        value_name = "MODE",
-        default_value = "exact",
-        hide_default_value = true
-    )]
-    pub(super) offset: Offset,
-    /// Which adapter, as `gpu-trace devices` lists them.
-    #[arg(long, value_name = "INDEX|NAME")]
-    pub(super) device: Option<String>,
-    /// Give every case a slightly wrong truth: all must fail (a check of the check).
-    #[arg(long)]
-    pub(super) disturb: bool,
 }

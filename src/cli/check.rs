@@ -2,9 +2,9 @@
 
 use std::fmt::Write as _;
 
+use clap::Args;
 use serde_json::json;
 
-use super::args::CheckArgs;
 use super::print;
 use crate::backend::open_gpu;
 use crate::check::{
@@ -12,6 +12,39 @@ use crate::check::{
 };
 use crate::error::{Error, Result};
 use crate::gpu::device::AdapterSummary;
+use crate::settings::Offset;
+
+/// The options of `check`.
+#[derive(Clone, Debug, Args)]
+pub(super) struct CheckArgs {
+    /// Only this case, by number or part of its name; may be repeated.
+    #[arg(long, value_name = "NAME", allow_hyphen_values = true,
+          value_parser = clap::builder::NonEmptyStringValueParser::new())]
+    pub(super) case: Vec<String>,
+    /// Fewer trials: under a minute without a GPU.
+    #[arg(long)]
+    pub(super) quick: bool,
+    /// Print JSON.
+    #[arg(long)]
+    pub(super) json: bool,
+    /// Say what each case sets up, and where its worst error is.
+    #[arg(short, long)]
+    pub(super) verbose: bool,
+    /// How paths leave a surface: exact, or to see what fails then none, back:X, out:X, ulp.
+    #[arg(
+        long,
+        value_name = "MODE",
+        default_value = "exact",
+        hide_default_value = true
+    )]
+    pub(super) offset: Offset,
+    /// Which adapter, as `gpu-trace devices` lists them.
+    #[arg(long, value_name = "INDEX|NAME")]
+    pub(super) device: Option<String>,
+    /// Give every case a slightly wrong truth: all must fail (a check of the check).
+    #[arg(long)]
+    pub(super) disturb: bool,
+}
 
 /// Runs `check`.
 pub(super) fn run(args: &CheckArgs) -> Result<()> {

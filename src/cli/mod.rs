@@ -32,6 +32,7 @@ Examples:
   gpu-trace                                    the built-in lecture scene, to lecture.png
   gpu-trace glass --spp 1024 -o glass.exr      another scene, linear floats
   gpu-trace my.toml --error 1% --time 2m       until the error is 1 % or two minutes are over
+  gpu-trace resume my.film                     go on with what --checkpoint my.film kept
   gpu-trace price my.toml                      what will 1 % cost, in seconds?
   gpu-trace effects my.toml                    what the kernel will hold, and why
   gpu-trace check --quick                      does this adapter stand the hard cases?
@@ -64,6 +65,10 @@ pub struct Cli {
 enum Command {
     /// Render a scene (the same as without a subcommand).
     Render(Box<RenderArgs>),
+    /// Go on with a render from its film file (--checkpoint): to its end, or to a new one.
+    Resume(Box<render::ResumeArgs>),
+    /// Join the film files of parts (--sample-range) to one image.
+    Merge(Box<render::MergeArgs>),
     /// List what the kernel of a scene holds, which object asked for it, and what is left out.
     Effects {
         #[command(flatten)]
@@ -76,7 +81,7 @@ enum Command {
     #[command(after_help = price::AFTER_HELP)]
     Price(Box<price::PriceArgs>),
     /// Measure the hard numerical cases on this adapter against f64; exit 3 if any fails.
-    Check(Box<args::CheckArgs>),
+    Check(Box<check::CheckArgs>),
     /// Compare an image with a reference: errors, bias, FLIP, SSIM; exit 3 beyond a tolerance.
     #[command(after_help = compare::AFTER_HELP)]
     Compare(compare::CompareArgs),
@@ -161,6 +166,8 @@ fn run(cli: Cli) -> Result<()> {
             render::run(&cli.render)
         }
         Some(Command::Render(args)) => render::run(&args),
+        Some(Command::Resume(args)) => render::resume(&args),
+        Some(Command::Merge(args)) => render::merge(&args),
         Some(Command::Effects { render, json }) => effects::run(&render, json),
         Some(Command::Price(args)) => price::run(&args),
         Some(Command::Check(args)) => check::run(&args),

@@ -9,7 +9,7 @@ use super::window::LEAST_SAMPLES;
 pub const PILOT_SAMPLES: u64 = LEAST_SAMPLES;
 
 /// Tiles get 2^step times the samples of those that get least, with a step of up to this.
-const STEPS: u8 = 4;
+pub(super) const STEPS: u8 = 4;
 
 impl Allocation {
     /// What makes the image's relative error least for its samples, as far as `pilot` shows, with at

@@ -33,6 +33,33 @@ pub struct AovSums {
 }
 
 impl AovSums {
+    /// The numbers of one pixel.
+    pub const NUMBERS: usize = 23;
+
+    /// All numbers: the classes by their order, red, green and blue of each; normal, albedo, depth, hits.
+    #[must_use]
+    pub fn to_numbers(&self) -> [f64; Self::NUMBERS] {
+        let mut numbers = [0.0; Self::NUMBERS];
+        numbers[..15].copy_from_slice(self.classes.as_flattened());
+        numbers[15..18].copy_from_slice(&self.normal);
+        numbers[18..21].copy_from_slice(&self.albedo);
+        (numbers[21], numbers[22]) = (self.depth, self.hits);
+        numbers
+    }
+
+    /// What [`to_numbers`](Self::to_numbers) was of.
+    #[must_use]
+    pub fn of_numbers(numbers: &[f64; Self::NUMBERS]) -> Self {
+        let three = |at: usize| [numbers[at], numbers[at + 1], numbers[at + 2]];
+        Self {
+            classes: [0, 1, 2, 3, 4].map(|class| three(3 * class)),
+            normal: three(15),
+            albedo: three(18),
+            depth: numbers[21],
+            hits: numbers[22],
+        }
+    }
+
     /// Adds the sums of further samples.
     pub fn add(&mut self, other: &Self) {
         let pairs = self.classes.as_flattened_mut().iter_mut();

@@ -2,22 +2,22 @@
 
 use super::allocation::Allocation;
 use super::aov::AovSums;
-use super::window::{Tally, Window};
+use super::window::{Tally, Window, half_of};
 use crate::settings::Rect;
 
 /// Sums over all samples so far.
 #[derive(Clone, Debug)]
 pub struct Film {
-    allocation: Allocation,
+    pub(super) allocation: Allocation,
     /// By step.
-    levels: Vec<Level>,
+    pub(super) levels: Vec<Level>,
     /// Windows go to one of two halves, which are independent of each other unless a scramble has been cut.
-    halves: [Half; 2],
+    pub(super) halves: [Half; 2],
     /// Empty until a window has some.
-    aovs: Vec<AovSums>,
-    tally: Tally,
+    pub(super) aovs: Vec<AovSums>,
+    pub(super) tally: Tally,
     /// The paths that the tally is of.
-    paths: u64,
+    pub(super) paths: u64,
 }
 
 /// Bytes that a film keeps of a pixel, sums beside the image aside: two halves of two sums.
@@ -25,27 +25,27 @@ pub const PIXEL_BYTES: usize = 2 * 2 * size_of::<[f64; 3]>();
 
 /// The sums over some of the windows, by pixel.
 #[derive(Clone, Debug)]
-struct Half {
-    sum: Vec<[f64; 3]>,
+pub(super) struct Half {
+    pub(super) sum: Vec<[f64; 3]>,
     /// Estimated variance of the covered samples' sum.
-    variance: Vec<[f64; 3]>,
+    pub(super) variance: Vec<[f64; 3]>,
 }
 
 /// What the pixels of one step of the allocation have.
-#[derive(Clone, Debug, Default)]
-struct Level {
-    pixels: u64,
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+pub(super) struct Level {
+    pub(super) pixels: u64,
     /// Samples in each half.
-    halves: [u64; 2],
+    pub(super) halves: [u64; 2],
     /// Batches, and the samples in them, of windows that have at least two.
-    batches: u64,
-    covered: u64,
+    pub(super) batches: u64,
+    pub(super) covered: u64,
     /// Of these windows: the samples in their batches squared, over one less than the batches.
-    doubt: f64,
+    pub(super) doubt: f64,
 }
 
 impl Level {
-    fn samples(&self) -> u64 {
+    pub(super) fn samples(&self) -> u64 {
         self.halves.iter().sum()
     }
 
@@ -115,8 +115,8 @@ impl Film {
             0.0
         };
         let level = &mut self.levels[usize::from(step)];
-        let lesser = usize::from(level.halves[1] < level.halves[0]);
-        let half = &mut self.halves[lesser];
+        let which = half_of(window.samples.start);
+        let half = &mut self.halves[which];
         for (i, pixel) in window.pixels.iter().enumerate() {
             if self.allocation.step(i) != step {
                 continue;
@@ -133,7 +133,7 @@ impl Film {
             }
         }
         let samples = window.samples.end - window.samples.start;
-        level.halves[lesser] += samples;
+        level.halves[which] += samples;
         if batches > 1 {
             let covered = batches * window.batch;
             level.batches += batches;
@@ -250,7 +250,7 @@ impl Film {
         let mean = self.mean(i);
         let over = |v: f64, m: f64| v / (m * m + floor);
         let all: f64 = (0..3).map(|c| over(variance[c], mean[c])).sum();
-        if level.halves[1] == 0 {
+        if level.halves.contains(&0) {
             return Some([all / 3.0; 2]);
         }
         let scale = level.scale();

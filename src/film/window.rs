@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use super::aov::AovSums;
+use crate::sampler::PILOT;
 use crate::settings::Rect;
 
 /// Samples a block: f32 sums run over one block, and every batch, whose spread gives the error
@@ -20,6 +21,21 @@ pub fn window_end(start: u64, end: u64) -> u64 {
     let boundary = boundary.unwrap_or((start / WINDOW + 1).saturating_mul(WINDOW));
     // A window's samples share the high word of the sample index.
     boundary.min(end)
+}
+
+/// Which of the two halves of the jackknife ([`Film::relative_variance`](super::Film::relative_variance)) a
+/// window belongs to that starts at `start`: every other of the windows that [`window_end`] ends, whichever of
+/// them are there, and in whatever order they come. A pilot's count like those from sample 0 on.
+#[must_use]
+pub fn half_of(start: u64) -> usize {
+    let start = start.checked_sub(PILOT).unwrap_or(start);
+    let number = match start {
+        0..16 => 0,
+        16..64 => 1,
+        64..128 => 2,
+        _ => 3 + start / WINDOW,
+    };
+    (number % 2) as usize
 }
 
 /// Samples below which no render stops by its error.
@@ -68,7 +84,7 @@ impl Window {
 }
 
 /// Counts over any set of samples.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Tally {
     /// Rays traced.
     pub rays: u64,
@@ -94,7 +110,7 @@ impl Tally {
 }
 
 /// Where a sample was no finite number.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct NonFinite {
     /// The pixel, in the whole image.
     pub pixel: [u32; 2],
@@ -102,4 +118,56 @@ pub struct NonFinite {
     pub sample: u64,
     /// The bounce after which it was seen.
     pub bounce: u32,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Windows in the order of one render from sample `start` on: that is how halves were chosen before
+    /// parts could come in any order.
+    fn by_the_lesser_so_far(start: u64) -> Vec<(usize, usize)> {
+        let (mut start, end, mut halves) = (start, 20_000, [0; 2]);
+        let mut chosen = Vec::new();
+        while start < end {
+            let next = window_end(start, end);
+            let lesser = usize::from(halves[1] < halves[0]);
+            halves[lesser] += next - start;
+            chosen.push((lesser, half_of(start)));
+            start = next;
+        }
+        chosen
+    }
+
+    #[test]
+    fn halves_are_those_of_one_render() {
+        for begin in [0, PILOT] {
+            let (mut start, mut halves) = (0, Vec::new());
+            while start < 20_000 {
+                halves.push(half_of(begin + start));
+                start = window_end(start, 20_000);
+            }
+            let before = by_the_lesser_so_far(0);
+            let before: Vec<usize> = before.iter().map(|(lesser, _)| *lesser).collect();
+            assert_eq!(halves, before);
+        }
+        // Companion: a render that begins elsewhere had others.
+        let elsewhere = by_the_lesser_so_far(16);
+        assert!(elsewhere.iter().any(|(lesser, ours)| lesser != ours));
+    }
+
+    #[test]
+    fn all_parts_of_a_window_are_in_one_half() {
+        for (start, end) in [
+            (0, 16),
+            (16, 64),
+            (64, 128),
+            (128, 256),
+            (256, 512),
+            (512, 768),
+        ] {
+            assert!((start..end).all(|at| half_of(at) == half_of(start)));
+            assert_ne!(half_of(start), half_of(end), "{end}");
+        }
+    }
 }

@@ -46,6 +46,39 @@ pub(super) fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
     }
 }
 
+/// As [`replace`], for what must survive even a machine that stops: the bytes are on the disk before the file
+/// takes its name, and the name is before this returns. Only for regular files.
+pub(crate) fn replace_durably(
+    path: &Path,
+    write: impl FnOnce(&mut File) -> io::Result<()>,
+) -> io::Result<()> {
+    let Destination::File(path) = Destination::of(path)? else {
+        return Err(io::Error::other("it is no regular file"));
+    };
+    let mut temporary = temporary_beside(&path)?;
+    write(temporary.as_file_mut())?;
+    temporary.as_file().sync_all()?;
+    temporary.persist(&path).map_err(|failure| failure.error)?;
+    sync_directory(split(&path)?.0)
+}
+
+/// Waits until the names in a directory are on the disk.
+#[cfg(unix)]
+fn sync_directory(directory: &Path) -> io::Result<()> {
+    match File::open(directory).and_then(|directory| directory.sync_all()) {
+        // Some file systems cannot, and a directory may be written to but not read: nothing is lost by that as
+        // long as the machine runs.
+        Err(error) if error.kind() == io::ErrorKind::PermissionDenied => Ok(()),
+        Err(error) if error.raw_os_error() == Some(libc::EINVAL) => Ok(()),
+        done => done,
+    }
+}
+
+#[cfg(not(unix))]
+fn sync_directory(_directory: &Path) -> io::Result<()> {
+    Ok(())
+}
+
 /// Whether [`write`] could write to `path`, found out by creating and removing a temporary file
 /// where a real one would be created. Returns what identifies the file, or nothing for what is not
 /// a regular file. Two paths to one file have the same identity.

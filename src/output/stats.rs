@@ -3,7 +3,7 @@
 use std::io;
 use std::path::Path;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::{Metadata, atomic};
 use crate::error::{Action, Error, Result};
@@ -86,7 +86,7 @@ pub struct Stats {
 }
 
 /// A device as the system names it.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Device {
     /// The product.
     pub name: String,

@@ -3,7 +3,8 @@
 use std::path::{MAIN_SEPARATOR, Path};
 
 use super::load::{Loaded, load_file, load_str};
-use super::particles::direct::{self, Look};
+use super::particles::direct;
+use super::particles::look::Look;
 use super::suggest::nearest;
 use crate::error::{Error, Result};
 use crate::particles::Format;

@@ -1,6 +1,9 @@
 //! A name for a scene's values, to tell whether two renders are of the same scene.
 
+use std::fs::File;
 use std::hash::Hasher as _;
+use std::io::{self, BufRead as _, BufReader};
+use std::path::Path;
 
 use fnv::FnvHasher;
 use glam::DVec3;
@@ -45,6 +48,24 @@ pub fn content_hash(scene: &Scene) -> String {
         hash.kind(&material.kind);
     }
     format!("{:016x}", hash.0.finish())
+}
+
+/// The same of the bytes of a file.
+///
+/// # Errors
+/// If it cannot be read.
+pub fn file_hash(path: &Path) -> io::Result<String> {
+    let mut hasher = FnvHasher::default();
+    let mut file = BufReader::new(File::open(path)?);
+    loop {
+        let bytes = file.fill_buf()?;
+        if bytes.is_empty() {
+            return Ok(format!("{:016x}", hasher.finish()));
+        }
+        hasher.write(bytes);
+        let count = bytes.len();
+        file.consume(count);
+    }
 }
 
 #[derive(Default)]

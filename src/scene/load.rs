@@ -6,12 +6,13 @@
 use std::fs::{self, File};
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
-use std::sync::LazyLock;
+use std::sync::{Arc, LazyLock};
 
 use serde::Deserialize;
 use toml::de::{DeTable, Deserializer};
 
 use super::file::{SceneFile, json_schema};
+use super::particles::look::Look;
 use super::report::{Problem, Report};
 use super::{Scene, content_hash, shape, validate};
 use crate::error::{Action, Error, Result};
@@ -28,17 +29,38 @@ pub struct Loaded {
     pub name: String,
     /// What is legal and probably not meant, each rendered with file, line, column and the line.
     pub warnings: Vec<String>,
-    /// The files that it was read from.
+    /// What it was made from.
+    pub source: Source,
+    /// The files that the source names, each once.
     pub files: Vec<PathBuf>,
     /// Hash of the scene's values (16 hexadecimal digits), see [`content_hash`].
     pub hash: String,
+}
+
+/// What a scene was made from: with the files that it names it can be made again.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Source {
+    /// The text of a scene file.
+    Text {
+        /// All of it.
+        text: Arc<str>,
+        /// The file; `None` for a scene that is in none, as a built-in one.
+        file: Option<PathBuf>,
+    },
+    /// A particle file, which is the only one named, without a scene file.
+    Particles(Look),
 }
 
 impl Loaded {
     /// The files that it was read from: no output may replace them.
     #[must_use]
     pub fn inputs(&self) -> Vec<&Path> {
-        self.files.iter().map(PathBuf::as_path).collect()
+        let scene = match &self.source {
+            Source::Text { file, .. } => file.as_deref(),
+            Source::Particles(_) => None,
+        };
+        let named = self.files.iter().map(PathBuf::as_path);
+        named.chain(scene).collect()
     }
 }
 
@@ -59,9 +81,8 @@ pub fn load_file(path: &Path) -> Result<Loaded> {
     match str::from_utf8(&bytes) {
         Ok(text) => {
             let folder = path.parent().unwrap_or(Path::new(""));
-            let mut loaded = load(name, &shown, text, folder)?;
-            loaded.files.push(path.to_owned());
-            Ok(loaded)
+            let file = Some(path.to_owned());
+            load(name, &shown, text, folder, file)
         }
         Err(error) => Err(not_utf8(&shown, &bytes, error.valid_up_to())),
     }
@@ -73,7 +94,15 @@ pub fn load_file(path: &Path) -> Result<Loaded> {
 /// # Errors
 /// [`Error::Scene`] if the text is not a scene.
 pub fn load_str(name: &str, text: &str) -> Result<Loaded> {
-    load(name.to_owned(), name, text, Path::new(""))
+    load_str_in(name, text, Path::new(""))
+}
+
+/// As [`load_str`], with the files that the text names relative to `folder`.
+///
+/// # Errors
+/// Those of [`load_str`].
+pub fn load_str_in(name: &str, text: &str, folder: &Path) -> Result<Loaded> {
+    load(name.to_owned(), name, text, folder, None)
 }
 
 fn read(path: &Path) -> io::Result<Vec<u8>> {
@@ -114,18 +143,30 @@ fn failed(shown: &str, text: &str, errors: Vec<Problem>) -> Error {
     Error::Scene(report.error_text(shown, text).unwrap_or_default())
 }
 
-fn load(name: String, shown: &str, text: &str, folder: &Path) -> Result<Loaded> {
+fn load(
+    name: String,
+    shown: &str,
+    text: &str,
+    folder: &Path,
+    file: Option<PathBuf>,
+) -> Result<Loaded> {
     let mut report = Report::default();
     let parsed = parse(text, folder, &mut report);
     if let Some(errors) = report.error_text(shown, text) {
         return Err(Error::Scene(errors));
     }
-    let Some((scene, files)) = parsed else {
+    let Some((scene, mut files)) = parsed else {
         return Err(Error::Scene(format!("error: {shown} is not a scene file")));
     };
+    files.sort();
+    files.dedup();
     Ok(Loaded {
         hash: content_hash(&scene),
         warnings: report.warning_texts(shown, text),
+        source: Source::Text {
+            text: text.into(),
+            file,
+        },
         name,
         files,
         scene,

@@ -20,7 +20,7 @@ mod validate;
 
 pub use describe::summary;
 pub use file::{MAX_BOUNCES, MAX_SIDE, MAX_SPP, json_schema};
-pub use hash::content_hash;
+pub use hash::{content_hash, file_hash};
 pub use load::Loaded;
 
 use glam::DVec3;

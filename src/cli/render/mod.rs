@@ -1,13 +1,20 @@
 //! `gpu-trace render`: from a scene file to images.
 
+mod checkpoint;
 mod display;
+mod merge;
+mod resume;
 mod statistics;
 mod summary;
 
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
+use self::checkpoint::Checkpoint;
 use self::display::Display;
+pub(super) use self::merge::{MergeArgs, run as merge};
+use self::resume::Before;
+pub(super) use self::resume::{ResumeArgs, run as resume};
 use self::statistics::statistics;
 use self::summary::{left_out, no_stderr, not_finite, observations, summary};
 use super::args::RenderArgs;
@@ -24,7 +31,7 @@ use crate::output::stats::{Device, Seconds};
 use crate::output::{
     Contents, Layer, Plane, Progress, Stats, Target, atomic, check_all, write_all,
 };
-use crate::render::{Outcome, Renderer, StoppedBy, render};
+use crate::render::{Keep, Outcome, Renderer, StoppedBy, go_on};
 use crate::scene::load::Loaded;
 use crate::shader::{Stage, link};
 
@@ -33,12 +40,21 @@ struct Request {
     loaded: Loaded,
     job: Job,
     targets: Vec<Target>,
+    /// The film file of a render that goes on.
+    before: Option<Before>,
 }
 
 impl Request {
-    /// The images, as they were typed.
-    fn files(&self) -> String {
-        let files: Vec<String> = self.targets.iter().map(ToString::to_string).collect();
+    /// The images, as they were typed; the film file where there are none.
+    fn files(&self, args: &RenderArgs) -> String {
+        let mut files: Vec<String> = self.targets.iter().map(ToString::to_string).collect();
+        if files.is_empty() {
+            files.extend(
+                args.checkpoint
+                    .iter()
+                    .map(|path| path.display().to_string()),
+            );
+        }
         files.join(", ")
     }
 }
@@ -46,7 +62,11 @@ impl Request {
 /// Runs `render`.
 pub(super) fn run(args: &RenderArgs) -> Result<()> {
     let begin = Instant::now();
-    let request = request(args)?;
+    perform(args, request(args)?, begin)
+}
+
+/// Renders what was decided.
+fn perform(args: &RenderArgs, request: Request, begin: Instant) -> Result<()> {
     let job = &request.job;
     let signals = Signals::listen()?;
     let progress = Progress::new(args.progress, args.quiet);
@@ -78,14 +98,36 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
             job.effects().names().collect::<Vec<_>>().join(", ")
         ));
     }
+    let device = Device {
+        name,
+        backend: interface,
+        driver,
+    };
+    // Once the renderer has its memory, in whose account the film is.
+    let begun = request.before.as_ref().map(|before| before.begun(job));
+    let begun = begun.transpose()?;
+    let finished = begun.as_ref().is_some_and(|b| b.finished.is_some());
+    let mut checkpoint = match &args.checkpoint {
+        Some(path) if finished => {
+            progress.message(&format!("{} is complete: nothing is added", path.display()));
+            None
+        }
+        Some(path) => {
+            let kind = backend.kind();
+            let about = checkpoint::about(args, &request, kind, &device, &mut warnings)?;
+            Some(Checkpoint::new(path, about, &progress))
+        }
+        None => None,
+    };
     for warning in &warnings {
         progress.warning(warning);
     }
     let said = warnings.len();
-
     let mut watch = Display::new(&progress, &signals, job.settings());
-    let outcome = render(renderer.as_mut(), job, &mut watch);
+    let keep = checkpoint.as_mut().map(|c| c as &mut dyn Keep);
+    let outcome = go_on(renderer.as_mut(), job, &mut watch, begun, keep);
     progress.finish();
+    let kept = checkpoint.map_or(Ok(()), |checkpoint| checkpoint.end(&outcome, &mut warnings));
     // Its memory is needed again.
     drop(renderer);
     let auditing = Instant::now();
@@ -100,17 +142,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
     for warning in &warnings[said..] {
         progress.warning(warning);
     }
-    let stats = statistics(
-        &request.loaded,
-        job,
-        &outcome,
-        backend.kind(),
-        Device {
-            name,
-            backend: interface,
-            driver,
-        },
-    );
+    let stats = statistics(&request.loaded, job, &outcome, backend.kind(), device);
     let stats = Stats {
         seconds: Seconds {
             total: begin.elapsed().as_secs_f64(),
@@ -124,28 +156,46 @@ pub(super) fn run(args: &RenderArgs) -> Result<()> {
         ..stats
     };
     let written = finish(args, &request, &outcome, &stats);
+    let is_cut = matches!(
+        outcome.stopped_by,
+        StoppedBy::Failure | StoppedBy::Interrupt
+    );
+    let film = args.checkpoint.as_ref();
+    if let Some(path) = film.filter(|path| is_cut && path.exists()) {
+        progress.message(&format!("gpu-trace resume {} goes on", path.display()));
+    }
+    if outcome.failure.is_some() || written.is_err() {
+        // What is said last is another error.
+        if let Err(error) = &kept {
+            progress.warning(&error.to_string());
+        }
+    }
     if let Some(failure) = &outcome.failure {
-        return Err(failed(failure, &outcome, &request, written));
+        return Err(failed(failure, &outcome, &request.files(args), written));
     }
     written?;
-    if let Some(text) = not_finite(&outcome).filter(|_| !args.allow_non_finite) {
-        return Err(Error::NonFinite(format!(
-            "{text} (--allow-non-finite makes this a warning)"
-        )));
-    }
+    kept?;
+    check_finite(&outcome, args.allow_non_finite)?;
     signals
         .code()
         .map_or(Ok(()), |code| Err(Error::Interrupted(code)))
 }
 
+/// Makes samples that are not finite a failure, unless that is allowed.
+fn check_finite(outcome: &Outcome, allowed: bool) -> Result<()> {
+    match not_finite(outcome).filter(|_| !allowed) {
+        None => Ok(()),
+        Some(text) => Err(Error::NonFinite(format!(
+            "{text} (--allow-non-finite makes this a warning)"
+        ))),
+    }
+}
+
 /// A failure in the middle of a render, with what became of the samples before it.
-fn failed(failure: &Error, outcome: &Outcome, request: &Request, written: Result<()>) -> Error {
+fn failed(failure: &Error, outcome: &Outcome, files: &str, written: Result<()>) -> Error {
     let saved = match (outcome.film.samples(), written) {
         (0, _) => "no samples were done, and no file was changed".to_owned(),
-        (spp, Ok(())) => format!(
-            "the {spp} samples a pixel done before are in {}",
-            request.files()
-        ),
+        (spp, Ok(())) => format!("the {spp} samples a pixel done before are in {files}"),
         (_, Err(error)) => error.to_string(),
     };
     Error::Gpu(format!("{failure}; {saved}"))
@@ -171,6 +221,10 @@ fn request(args: &RenderArgs) -> Result<Request> {
     let mut outputs: Vec<&Path> = targets.iter().map(|t| t.path.as_path()).collect();
     outputs.extend(args.stats.as_deref());
     outputs.extend(args.dump_wgsl.as_deref());
+    outputs.extend(args.checkpoint.as_deref());
+    if let Some(path) = &args.checkpoint {
+        checkpoint::check_new(path)?;
+    }
     check_all(&outputs, &loaded.inputs())?;
     let job = prepare(&loaded.scene, &settings)?;
     // What is needed beside is known with the device.
@@ -179,6 +233,7 @@ fn request(args: &RenderArgs) -> Result<Request> {
         loaded,
         job,
         targets,
+        before: None,
     })
 }
 
@@ -251,7 +306,7 @@ fn finish(args: &RenderArgs, request: &Request, outcome: &Outcome, stats: &Stats
     if args.quiet {
         Ok(())
     } else {
-        print(&summary(&request.files(), stats))
+        print(&summary(&request.files(args), stats))
     }
 }
 

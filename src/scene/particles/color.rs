@@ -37,10 +37,11 @@ pub enum Coloring {
 macro_rules! maps {
     ($($variant:ident $name:literal $gradient:ident),* $(,)?) => {
         /// A colour map.
-        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
         pub enum Map {
             #[default]
             $(
+                #[serde(rename = $name)]
                 #[doc = concat!("`", $name, "`.")]
                 $variant,
             )*

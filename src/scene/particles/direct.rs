@@ -5,11 +5,12 @@ use std::path::Path;
 
 use glam::DVec3;
 
+use super::look::Look;
 use super::table::colored;
-use super::{Ball, Cloud, Coloring, Fault, Map, RadiusBy, Request, Similarity, gather};
+use super::{Ball, Cloud, Coloring, Fault, RadiusBy, Request, Similarity, gather};
 use crate::error::{Error, Result};
 use crate::materials::diffuse::{self, Diffuse};
-use crate::scene::load::Loaded;
+use crate::scene::load::{Loaded, Source};
 use crate::scene::{Camera, Handedness, Material, RenderDefaults, Scene, Sphere, content_hash};
 
 /// Size of the picture, in pixels.
@@ -27,51 +28,6 @@ const BACKGROUND: DVec3 = DVec3::ONE;
 const LAMP: [f64; 2] = [5.0, 1.5];
 /// What the lamp adds where it shines straight on, as a share of white.
 const LAMP_SHARE: f64 = 0.5;
-
-/// How the file is shown.
-#[derive(Clone, Debug, Default)]
-pub struct Look {
-    /// `element` or a column; `None`: elements where the file has them, else one colour.
-    pub color_by: Option<String>,
-    /// A number, a column, `vdw` or `covalent`.
-    pub radius_by: Option<String>,
-    /// The colour map of a column.
-    pub map: Option<Map>,
-    /// Radiance of the background.
-    pub background: Option<DVec3>,
-}
-
-impl Look {
-    /// The first option that was given.
-    #[must_use]
-    pub fn given(&self) -> Option<&'static str> {
-        match self {
-            Self {
-                color_by: Some(_), ..
-            } => Some("--color-by"),
-            Self {
-                radius_by: Some(_), ..
-            } => Some("--radius-by"),
-            Self { map: Some(_), .. } => Some("--map"),
-            Self {
-                background: Some(_),
-                ..
-            } => Some("--background"),
-            _ => None,
-        }
-    }
-
-    fn coloring(&self) -> Option<Coloring> {
-        Some(match self.color_by.as_deref()? {
-            "element" => Coloring::Element,
-            name => Coloring::Column {
-                name: name.to_owned(),
-                map: self.map.unwrap_or_default(),
-                range: None,
-            },
-        })
-    }
-}
 
 /// The scene that shows the file.
 ///
@@ -109,6 +65,7 @@ pub fn load(path: &Path, look: &Look) -> Result<Loaded> {
     Ok(Loaded {
         hash: content_hash(&scene),
         warnings: Vec::new(),
+        source: Source::Particles(look.clone()),
         files: vec![path.to_owned()],
         name,
         scene,

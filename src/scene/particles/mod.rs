@@ -2,6 +2,7 @@
 
 mod color;
 pub mod direct;
+pub mod look;
 mod select;
 mod table;
 
