@@ -83,6 +83,7 @@ impl GpuRenderer {
         }
         let render = program.pass(&gpu, "render", &constants)?;
 
+        let gl = gpu.summary.backend == "gl";
         let mut engine = Engine::new(gpu);
         engine.buffer(PARTIALS, partials);
         engine.buffer(COUNTERS, size_of::<CountersRecord>() as u64);
@@ -119,7 +120,7 @@ impl GpuRenderer {
             side,
             radiance_scale: placement.radiance_scale,
             pace: Pace::unknown(),
-            step_limit: step_limit(placement, effects, settings.max_bounces),
+            step_limit: step_limit(placement, effects, settings.max_bounces, gl),
         })
     }
 
