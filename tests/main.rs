@@ -1,5 +1,5 @@
-//! All tests of the program and of its library in one executable: one is linked in a third of the time of
-//! some forty, and `cargo test NAME::` still runs those of a file.
+//! All tests of the program and of its library in one executable, which is compiled and linked once and not
+//! some forty times; `cargo test NAME::` still runs those of a file.
 
 // What they share.
 mod cli_support;

@@ -101,7 +101,11 @@ pub(crate) fn build(arguments: &[&str]) -> Result<Vec<Tests>, String> {
         let listed = Command::new(&tests.program)
             .args(["--list", "--format", "terse"])
             .output();
-        let listed = listed.map_err(|e| format!("{}: {e}", tests.program.display()))?;
+        let shown = tests.program.display();
+        let listed = listed.map_err(|e| format!("{shown}: {e}"))?;
+        if !listed.status.success() {
+            return Err(format!("{shown} --list: {}", listed.status));
+        }
         files.extend(by_file(&tests, &String::from_utf8_lossy(&listed.stdout)));
     }
     Ok(files)
@@ -185,13 +189,16 @@ pub(crate) fn run(parts: Vec<Part>, variable: Option<(&str, &str)>) -> Vec<Count
 
 /// Runs a job to its end, and shows what it wrote.
 fn one(driver: &Driver, job: Job, variable: Option<(&str, &str)>) -> Count {
-    let (name, mut command, filtered) = match job {
+    let (name, mut command, wanted, filtered) = match job {
         Job::Command(command) => {
             let arguments: Vec<_> = command.get_args().map(|a| a.to_string_lossy()).collect();
-            (format!("gpu-trace {}", arguments.join(" ")), command, None)
+            let name = format!("gpu-trace {}", arguments.join(" "));
+            (name, command, None, 0)
         }
         Job::Tests(tests, options) => {
             let mut command = Command::new(&tests.program);
+            // Options such as `--ignored` choose once more.
+            let all = options.is_empty().then_some(tests.cases.len() as u64);
             command
                 .arg("--exact")
                 .args(options)
@@ -201,7 +208,7 @@ fn one(driver: &Driver, job: Job, variable: Option<(&str, &str)>) -> Count {
             if std::env::var_os("RUST_TEST_THREADS").is_none() {
                 command.env("RUST_TEST_THREADS", "1");
             }
-            (tests.name, command, Some(tests.filtered))
+            (tests.name, command, Some(all), tests.filtered)
         }
     };
     let name = format!("{name} on {}", driver.name);
@@ -232,12 +239,19 @@ fn one(driver: &Driver, job: Job, variable: Option<(&str, &str)>) -> Count {
                 count.passed = number(result, "passed");
                 count.failed = number(result, "failed");
                 count.ignored = number(result, "ignored");
-                count.filtered = filtered.unwrap_or(0);
+                count.filtered = filtered;
             }
             if !output.status.success() {
                 count.faults.push(format!("{name}: {}", output.status));
-            } else if filtered.is_some() && result.is_none() {
+            } else if wanted.is_some() && result.is_none() {
                 count.faults.push(format!("{name}: it says no result"));
+            } else if let Some(Some(all)) = wanted {
+                let ran = count.passed + count.ignored;
+                if ran != all {
+                    count
+                        .faults
+                        .push(format!("{name}: {ran} tests of {all} ran"));
+                }
             }
         }
     }
@@ -350,10 +364,12 @@ mod tests {
             panic!("three parts");
         };
         assert_eq!((good.passed, good.failed, good.faults.len()), (1, 0, 0));
-        assert_eq!((missing.passed, missing.faults.len()), (0, 1));
-        assert!(
-            missing.faults[0].contains("/no/such/program") || missing.faults[0].contains("No such")
-        );
+        // One that is not there, and a command that is not.
+        assert_eq!((missing.passed, missing.faults.len()), (0, 2));
+        for words in ["0 tests of 1 ran", "No such file"] {
+            let found = missing.faults.iter().any(|fault| fault.contains(words));
+            assert!(found, "{words}: {missing:?}");
+        }
         assert_eq!((bad.passed, bad.faults.len()), (0, 1), "{bad:?}");
     }
 }

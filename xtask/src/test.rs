@@ -126,6 +126,10 @@ pub(crate) fn all(arguments: &[String]) -> Result<(), String> {
         driver,
         adapter,
     };
+    let all = choose(&tests, &filters, false);
+    if all.is_empty() {
+        return Err(format!("no test has {} in its name", filters.join(" or ")));
+    }
     // Who chooses tests gets just these.
     let elsewhere = !long && chosen.is_empty() && filters.is_empty();
     let mut parts = vec![part(driver, adapter, false)];
