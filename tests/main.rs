@@ -26,6 +26,7 @@ mod distribution;
 mod effects;
 mod faults;
 mod film_files;
+mod frames;
 mod functions;
 mod functions_scene;
 mod furnace;

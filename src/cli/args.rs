@@ -14,8 +14,8 @@ use crate::backend::{BackendChoice, BackendKind};
 use crate::error::{Error, Result};
 use crate::output::{Aov, ProgressMode};
 use crate::sampler::Sampler;
-use crate::scene::particles::Map;
 use crate::scene::particles::look::Look;
+use crate::scene::particles::{Frames, Map};
 use crate::scene::{Loaded, MAX_BOUNCES, Scene, builtin};
 use crate::settings::{
     DEFAULT_TERMINATION, GeometryChoice, Integrator, LightSampling, MAXIMUM_SPP, Offset, Rect,
@@ -303,6 +303,15 @@ pub struct RenderArgs {
     pub background: Option<DVec3>,
     #[arg(
         long,
+        value_name = "A..B..STEP",
+        help_heading = "Particle files",
+        value_parser = values::frames,
+        allow_hyphen_values = true,
+        help = "An image for each STEP-th frame of a trajectory from A to B - 1, as in 0..100..10 or 0.. for all; `{frame}` in the names of outputs is its number, `{frame:04}` with zeros before it"
+    )]
+    pub frames: Option<Frames>,
+    #[arg(
+        long,
         value_name = "KIND@WINDOW",
         hide = true,
         help = "Let something fail, for tests"
@@ -328,15 +337,22 @@ impl RenderArgs {
     /// The scene.
     ///
     /// # Errors
-    /// Those of [`builtin::resolve_as`].
+    /// Those of [`builtin::resolve_as`], and [`Error::Usage`] if several are asked for.
     pub(super) fn load(&self) -> Result<Loaded> {
-        let look = Look {
+        if self.frames.is_some() {
+            return Err(Error::Usage("--frames is for `render`".into()));
+        }
+        builtin::resolve_as(self.scene.as_deref(), &self.look(), None)
+    }
+
+    /// How a particle file is shown.
+    pub(super) fn look(&self) -> Look {
+        Look {
             color_by: self.color_by.clone(),
             radius_by: self.radius_by.clone(),
             map: self.map,
             background: self.background,
-        };
-        builtin::resolve_as(self.scene.as_deref(), &look)
+        }
     }
 
     /// The layers, each once.

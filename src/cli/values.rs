@@ -6,6 +6,7 @@ use std::time::Duration;
 use glam::DVec3;
 
 use crate::materials::schema::MAX_MAGNITUDE;
+use crate::scene::particles::Frames;
 use crate::scene::{MAX_SIDE, MAX_SPP};
 use crate::settings::{Rect, TERMINATIONS};
 
@@ -112,6 +113,27 @@ pub(super) fn range(text: &str) -> Result<Range<u64>, String> {
         return Err("sample indices go up to 2^48".into());
     }
     Ok(range)
+}
+
+/// `A..B..STEP`, `A..B`, `A..` or `A....STEP`: each STEP-th frame from A up to, not including, B or the end.
+pub(super) fn frames(text: &str) -> Result<Frames, String> {
+    let form =
+        "write A..B..STEP, as in 0..100..10 (100 is not included), A..B, or A.. for all from A on";
+    let number = |n: &str| n.trim().parse::<u64>().map_err(|_| form.to_owned());
+    let (first, rest) = text.split_once("..").ok_or(form)?;
+    let (end, step) = match rest.split_once("..") {
+        Some((end, step)) => (end, number(step)?),
+        None => (rest, 1),
+    };
+    let frames = Frames {
+        first: number(first)?,
+        end: (!end.trim().is_empty()).then(|| number(end)).transpose()?,
+        step,
+    };
+    if step == 0 || frames.end.is_some_and(|end| end <= frames.first) {
+        return Err(format!("no frame lies in {text}; {form}"));
+    }
+    Ok(frames)
 }
 
 /// `white`, `black` or `R,G,B`: a radiance.

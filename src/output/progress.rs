@@ -143,6 +143,9 @@ impl Progress {
     pub fn update(&self, snapshot: &Snapshot) {
         let mut state = self.state();
         if let Display::Bar(bar) = &state.display {
+            if bar.is_finished() {
+                bar.reset();
+            }
             bar.set_message(labelled(&state.part, snapshot));
             bar.set_position((snapshot.fraction.clamp(0.0, 1.0) * BAR_STEPS as f64) as u64);
             return;
@@ -169,13 +172,12 @@ impl Progress {
         self.state().line("warning", "warning: ", text);
     }
 
-    /// Shows the last snapshot if it was not shown yet, and removes the bar. Messages may follow.
-    /// Happens by itself when dropped.
+    /// Shows the last snapshot if it was not shown yet, and removes the bar. Messages may follow, and snapshots of
+    /// another part, with which the bar comes back. Happens by itself when dropped.
     pub fn finish(&self) {
         let mut state = self.state();
         if let Display::Bar(bar) = &state.display {
             bar.finish_and_clear();
-            state.display = Display::None;
         }
         state.show_pending();
     }

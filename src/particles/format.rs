@@ -51,6 +51,12 @@ impl Format {
         }
     }
 
+    /// Whether a file can have more than one frame.
+    #[must_use]
+    pub const fn has_frames(self) -> bool {
+        matches!(self, Self::Xyz | Self::LammpsDump | Self::Pdb | Self::Mmcif)
+    }
+
     /// The format of a file with such a name, by its ending; `.gz` behind it says nothing.
     #[must_use]
     pub fn of_path(path: &Path) -> Option<Self> {

@@ -72,12 +72,15 @@ pub fn read(path: &Path, format: Format, frame: u64) -> Result<Particles, ReadEr
     Ok(parse(&source::load(path)?, format, frame)?)
 }
 
-/// How many frames a file has; 1 for formats that have no frames.
+/// How many frames a file has; 1 for formats that have no frames, whose file is not looked at.
 ///
 /// # Errors
 /// As [`read`]; of what lies within the frames, only what separates them is looked at.
 pub fn frames(path: &Path, format: Format) -> Result<u64, ReadError> {
-    Ok(count_frames(&source::load(path)?, format)?)
+    match format.has_frames() {
+        true => Ok(count_frames(&source::load(path)?, format)?),
+        false => Ok(1),
+    }
 }
 
 /// As [`read`], from the bytes of a file.

@@ -2,7 +2,7 @@
 
 use std::path::{MAIN_SEPARATOR, Path};
 
-use super::load::{Loaded, load_file, load_str};
+use super::load::{Loaded, load_file_at, load_str};
 use super::particles::direct;
 use super::particles::look::Look;
 use super::suggest::nearest;
@@ -64,16 +64,17 @@ pub fn get(name: &str) -> Option<&'static Builtin> {
 /// separator or ending in `.toml` is always a file. Any other word is an existing file, else a built-in scene.
 ///
 /// # Errors
-/// Those of [`load_file`], and [`Error::Usage`] for a word that is neither.
+/// Those of [`load_file_at`], and [`Error::Usage`] for a word that is neither.
 pub fn resolve(argument: Option<&str>) -> Result<Loaded> {
-    resolve_as(argument, &Look::default())
+    resolve_as(argument, &Look::default(), None)
 }
 
-/// The same, with particle files shown as `look` says.
+/// The same, with a particle file shown as `look` says, and in a scene file those that name no frame and have
+/// several at a frame.
 ///
 /// # Errors
 /// Those of [`resolve`], and [`Error::Usage`] if a look is asked for and the word is no particle file.
-pub fn resolve_as(argument: Option<&str>, look: &Look) -> Result<Loaded> {
+pub fn resolve_as(argument: Option<&str>, look: &Look, frame: Option<u64>) -> Result<Loaded> {
     let particles = argument
         .map(Path::new)
         .filter(|path| Format::of_path(path).is_some());
@@ -93,13 +94,13 @@ pub fn resolve_as(argument: Option<&str>, look: &Look) -> Result<Loaded> {
         .is_some_and(|extension| extension.eq_ignore_ascii_case("toml"));
     // A directory that happens to be called like a built-in scene does not hide it.
     if argument.is_some() && (separator || toml || path.is_file()) {
-        return load_file(path);
+        return load_file_at(path, frame);
     }
     if let Some(builtin) = get(word) {
         return load_str(builtin.name, builtin.text);
     }
     if path.exists() {
-        return load_file(path);
+        return load_file_at(path, frame);
     }
     let known = names().collect::<Vec<_>>().join(", ");
     let meant =

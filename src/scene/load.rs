@@ -33,6 +33,8 @@ pub struct Loaded {
     pub source: Source,
     /// The files that the source names, each once.
     pub files: Vec<PathBuf>,
+    /// Where a frame was asked for: how many frames all those files have that it is of; `None` if it is of none.
+    pub frames: Option<u64>,
     /// Hash of the scene's values (16 hexadecimal digits), see [`content_hash`].
     pub hash: String,
 }
@@ -69,6 +71,14 @@ impl Loaded {
 /// # Errors
 /// [`Error::File`] if it cannot be read, [`Error::Scene`] if it is not a scene.
 pub fn load_file(path: &Path) -> Result<Loaded> {
+    load_file_at(path, None)
+}
+
+/// The same, at a frame of the particle files that name none and have several.
+///
+/// # Errors
+/// Those of [`load_file`].
+pub fn load_file_at(path: &Path, frame: Option<u64>) -> Result<Loaded> {
     let shown = path.display().to_string();
     let bytes = read(path).map_err(|source| Error::File {
         action: Action::Read,
@@ -82,7 +92,8 @@ pub fn load_file(path: &Path) -> Result<Loaded> {
         Ok(text) => {
             let folder = path.parent().unwrap_or(Path::new(""));
             let file = Some(path.to_owned());
-            load(name, &shown, text, folder, file)
+            let place = Place { folder, frame };
+            load(name, &shown, text, place, file)
         }
         Err(error) => Err(not_utf8(&shown, &bytes, error.valid_up_to())),
     }
@@ -102,7 +113,29 @@ pub fn load_str(name: &str, text: &str) -> Result<Loaded> {
 /// # Errors
 /// Those of [`load_str`].
 pub fn load_str_in(name: &str, text: &str, folder: &Path) -> Result<Loaded> {
-    load(name.to_owned(), name, text, folder, None)
+    let place = Place {
+        folder,
+        frame: None,
+    };
+    load(name.to_owned(), name, text, place, None)
+}
+
+/// Where and when the files of a scene are looked at.
+#[derive(Clone, Copy)]
+pub(super) struct Place<'a> {
+    /// The folder from which they are named.
+    pub(super) folder: &'a Path,
+    /// The frame of those that name none and have several.
+    pub(super) frame: Option<u64>,
+}
+
+/// What a scene file holds.
+pub(super) struct Parsed {
+    pub(super) scene: Scene,
+    /// See [`Loaded::files`].
+    pub(super) files: Vec<PathBuf>,
+    /// See [`Loaded::frames`].
+    pub(super) frames: Option<u64>,
 }
 
 fn read(path: &Path) -> io::Result<Vec<u8>> {
@@ -147,15 +180,20 @@ fn load(
     name: String,
     shown: &str,
     text: &str,
-    folder: &Path,
+    place: Place<'_>,
     file: Option<PathBuf>,
 ) -> Result<Loaded> {
     let mut report = Report::default();
-    let parsed = parse(text, folder, &mut report);
+    let parsed = parse(text, place, &mut report);
     if let Some(errors) = report.error_text(shown, text) {
         return Err(Error::Scene(errors));
     }
-    let Some((scene, mut files)) = parsed else {
+    let Some(Parsed {
+        scene,
+        mut files,
+        frames,
+    }) = parsed
+    else {
         return Err(Error::Scene(format!("error: {shown} is not a scene file")));
     };
     files.sort();
@@ -169,12 +207,13 @@ fn load(
         },
         name,
         files,
+        frames,
         scene,
     })
 }
 
-/// The scene and the files that it names; `None` after errors, which the report then holds.
-fn parse(text: &str, folder: &Path, report: &mut Report) -> Option<(Scene, Vec<PathBuf>)> {
+/// `None` after errors, which the report then holds.
+fn parse(text: &str, place: Place<'_>, report: &mut Report) -> Option<Parsed> {
     static SCHEMA: LazyLock<serde_json::Value> = LazyLock::new(json_schema);
 
     let root = DeTable::parse(text).map_err(|error| report.errors.push(syntax(&error)));
@@ -194,7 +233,7 @@ fn parse(text: &str, folder: &Path, report: &mut Report) -> Option<(Scene, Vec<P
     let keys = validate::material_keys(root.get_ref());
     let file = SceneFile::deserialize(Deserializer::from(root))
         .map_err(|error| report.errors.push(syntax(&error)));
-    validate::scene(file.ok()?, &keys, folder, report)
+    validate::scene(file.ok()?, &keys, place, report)
 }
 
 /// An error of the TOML parser, in words for those who know other formats. It has a text and a place, and

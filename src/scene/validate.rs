@@ -2,13 +2,13 @@
 
 use std::collections::{BTreeSet, HashMap};
 use std::ops::Range;
-use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 use toml::Spanned;
 use toml::de::DeTable;
 
 use super::file::{CameraTable, HandednessName, MaterialTable, SceneFile, SphereTable};
+use super::load::{Parsed, Place};
 use super::particles;
 use super::report::{Problem, Report, SHOWN};
 use super::suggest::{list, nearest};
@@ -42,15 +42,13 @@ pub(super) fn material_keys(root: &DeTable<'_>) -> MaterialKeys {
     keys
 }
 
-/// The scene of a file and the files that it names; `None` after errors, which the report then holds.
-///
-/// Files that it names are looked for in `folder`.
+/// What a file holds whose files are at that place; `None` after errors, which the report then holds.
 pub(super) fn scene(
     file: SceneFile,
     keys: &MaterialKeys,
-    folder: &Path,
+    place: Place<'_>,
     report: &mut Report,
-) -> Option<(Scene, Vec<PathBuf>)> {
+) -> Option<Parsed> {
     let camera = camera(&file.camera, report);
     let mut materials: Vec<_> = file
         .material
@@ -119,8 +117,9 @@ pub(super) fn scene(
     // Those of the file: colours of particles come after them.
     let own = materials.len();
     let mut files = Vec::new();
+    let mut frames: Option<u64> = None;
     for table in &file.particles {
-        let request = particles::request(table, folder, report);
+        let request = particles::request(table, place.folder, report);
         let material = match &table.material {
             None => None,
             Some(name) => match materials[..own]
@@ -139,11 +138,25 @@ pub(super) fn scene(
             },
         };
         // Nothing is read for a file with errors.
-        let Some(request) = request.filter(|_| report.errors.is_empty()) else {
+        let Some(mut request) = request.filter(|_| report.errors.is_empty()) else {
             continue;
         };
         used.extend(material);
         files.push(request.file.clone());
+        if let Some(frame) = place.frame.filter(|_| table.frame.is_none()) {
+            match request.frames() {
+                Ok(there) if there > 1 => {
+                    request.frame = frame;
+                    frames = Some(frames.map_or(there, |other| other.min(there)));
+                    report.warnings.extend(particles::flickering(table));
+                }
+                Ok(_) => {}
+                Err(fault) => {
+                    report.errors.push(particles::problem(&fault, table));
+                    continue;
+                }
+            }
+        }
         match particles::gather(&request) {
             Ok(cloud) => particles::add(cloud, table, material, &mut materials, &mut spheres),
             Err(fault) => report.errors.push(particles::problem(&fault, table)),
@@ -181,7 +194,11 @@ pub(super) fn scene(
         return None;
     }
     warn(&scene, &spans, &used, report);
-    Some((scene, files))
+    Some(Parsed {
+        scene,
+        files,
+        frames,
+    })
 }
 
 /// The largest radius; the first of several.

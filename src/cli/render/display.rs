@@ -1,6 +1,6 @@
 //! How far a render is, while it runs.
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use crate::cli::signals::Signals;
 use crate::output::{Progress, Snapshot};
@@ -15,13 +15,44 @@ pub(super) struct Display<'a> {
     spp: Option<u64>,
     time: Option<Duration>,
     error: Option<f64>,
+    series: Series,
     /// Where the current stretch of speed measurement began.
     mark: (Duration, u64),
     rate: f64,
 }
 
+/// The place of a render among those of one command.
+#[derive(Clone, Copy)]
+pub(super) struct Series {
+    /// How many are done.
+    pub(super) done: usize,
+    /// How many there are.
+    pub(super) all: usize,
+    /// When the first began, with all that came before its samples.
+    pub(super) first_begin: Instant,
+    /// When this one began.
+    pub(super) begin: Instant,
+}
+
+impl Series {
+    /// Of the only render of a command.
+    pub(super) fn alone(begin: Instant) -> Self {
+        Self {
+            done: 0,
+            all: 1,
+            first_begin: begin,
+            begin,
+        }
+    }
+}
+
 impl<'a> Display<'a> {
-    pub(super) fn new(progress: &'a Progress, signals: &'a Signals, settings: &Settings) -> Self {
+    pub(super) fn new(
+        progress: &'a Progress,
+        signals: &'a Signals,
+        settings: &Settings,
+        series: Series,
+    ) -> Self {
         Self {
             progress,
             signals,
@@ -30,6 +61,7 @@ impl<'a> Display<'a> {
             spp: Some(settings.samples.end - settings.samples.start).filter(|n| *n != MAXIMUM_SPP),
             time: settings.time,
             error: settings.error,
+            series,
             mark: (Duration::ZERO, 0),
             rate: 0.0,
         }
@@ -52,14 +84,26 @@ impl Watch for Display<'_> {
             .error
             .zip(status.error)
             .map_or(0.0, |(want, have)| (want / have).powi(2));
-        let fraction = by_spp.max(by_time).max(by_error).min(1.0);
+        let own = by_spp.max(by_time).max(by_error).min(1.0);
+        let Series {
+            done,
+            all,
+            first_begin,
+            ..
+        } = self.series;
+        let fraction = (done as f64 + own) / all as f64;
+        let since_begin = match all {
+            1 => status.elapsed,
+            _ => first_begin.elapsed(),
+        };
+        let elapsed = since_begin.as_secs_f64();
         let remaining = (fraction > 0.0).then(|| elapsed * (1.0 / fraction - 1.0));
         self.progress.update(&Snapshot {
             samples: status.paths,
             spp: status.paths / self.pixels,
             spp_total: self.spp,
             fraction,
-            elapsed: status.elapsed,
+            elapsed: since_begin,
             remaining: remaining.and_then(|s| Duration::try_from_secs_f64(s).ok()),
             paths_per_second: self.rate,
             error: status.error,

@@ -5,7 +5,9 @@ use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum as _};
 
-use super::{Request, perform};
+use super::Request;
+use super::display::Series;
+use super::session::Session;
 use crate::backend::{BackendKind, LEAST_PIXEL_BYTES, check_memory};
 use crate::cli::args::RenderArgs;
 use crate::cli::choices::{self, Wanted};
@@ -112,7 +114,7 @@ pub(crate) fn run(args: &ResumeArgs) -> Result<()> {
             new_goal: has_new_goal(args),
         }),
     };
-    perform(&render, request, begin)
+    Session::open(&render)?.perform(&render, &request, Series::alone(begin))
 }
 
 impl Before {

@@ -86,6 +86,8 @@ pub(super) struct Painted {
     pub(super) colors: Vec<(String, DVec3)>,
     /// Indices into `colors`, in the order of what is kept; none where nothing colours.
     pub(super) of_kept: Vec<u16>,
+    /// The values of a column at the ends of its map.
+    pub(super) range: Option<[f64; 2]>,
 }
 
 /// Colours the particles `kept`.
@@ -100,6 +102,7 @@ pub(super) fn paint(
         Coloring::None | Coloring::ElementIfKnown => Ok(Painted {
             colors: Vec::new(),
             of_kept: Vec::new(),
+            range: None,
         }),
         Coloring::Element => {
             let Some(elements) = &particles.elements else {
@@ -135,7 +138,10 @@ pub(super) fn paint(
                 let c = gradient.eval_rational(step, STEPS);
                 (format!("{name} {}/{STEPS}", step + 1), rgb([c.r, c.g, c.b]))
             };
-            Ok(distinct(values.map(step), color))
+            Ok(Painted {
+                range: Some([low, high]),
+                ..distinct(values.map(step), color)
+            })
         }
     }
 }
@@ -157,6 +163,7 @@ fn distinct<T: Copy + Ord>(
     Painted {
         colors: order.into_iter().map(|(value, _)| color(value)).collect(),
         of_kept,
+        range: None,
     }
 }
 

@@ -34,6 +34,80 @@ const LAMP_SHARE: f64 = 0.5;
 /// # Errors
 /// [`Error::Usage`] if the file or an option cannot be used.
 pub fn load(path: &Path, look: &Look) -> Result<Loaded> {
+    let request = request(path, look)?;
+    let cloud = gather(&request).map_err(|fault| usage(&fault))?;
+    let view = View::of(&cloud.balls);
+    Ok(loaded(path, look, cloud, &view))
+}
+
+/// The frames of a particle file, all seen from one place and coloured by one map.
+#[derive(Debug)]
+pub(super) struct Movie {
+    look: Look,
+    request: Request,
+    view: View,
+}
+
+impl Movie {
+    /// Looks at those `frames` of the file.
+    ///
+    /// # Errors
+    /// Those of [`load`].
+    pub(super) fn open(
+        path: &Path,
+        look: &Look,
+        frames: impl Fn(u64) -> Result<Vec<u64>>,
+    ) -> Result<(Self, Vec<u64>)> {
+        let mut request = request(path, look)?;
+        let frames = frames(request.frames().map_err(|fault| usage(&fault))?)?;
+        let cloud = |frame| {
+            let request = Request {
+                frame,
+                ..request.clone()
+            };
+            gather(&request).map_err(|fault| usage(&fault))
+        };
+        let mut corners = NOWHERE;
+        let mut range: Option<[f64; 2]> = None;
+        for frame in &frames {
+            let cloud = cloud(*frame)?;
+            corners = around(corners, &cloud.balls);
+            range = match (range, cloud.range) {
+                (Some([a, b]), Some([c, d])) => Some([a.min(c), b.max(d)]),
+                (_, new) => new,
+            };
+        }
+        let mut framing = Framing::about(corners);
+        for frame in &frames {
+            framing.add(&cloud(*frame)?.balls);
+        }
+        if let Coloring::Column { range: of_map, .. } = &mut request.coloring {
+            *of_map = range;
+        }
+        let movie = Self {
+            look: look.clone(),
+            view: framing.view(),
+            request,
+        };
+        Ok((movie, frames))
+    }
+
+    /// The scene of a frame.
+    ///
+    /// # Errors
+    /// Those of [`load`].
+    pub(super) fn load(&self, frame: u64) -> Result<Loaded> {
+        let request = Request {
+            frame,
+            ..self.request.clone()
+        };
+        let cloud = gather(&request).map_err(|fault| usage(&fault))?;
+        Ok(loaded(&request.file, &self.look, cloud, &self.view))
+    }
+}
+
+/// What is asked of the file: its first frame.
+fn request(path: &Path, look: &Look) -> Result<Request> {
     let radius = look.radius_by.as_deref().map(|word| match word.parse() {
         Ok(number) => RadiusBy::Constant(number),
         Err(_) => RadiusBy::of_word(word),
@@ -44,7 +118,7 @@ pub fn load(path: &Path, look: &Look) -> Result<Loaded> {
             "--map: it needs a column in --color-by".into(),
         ));
     }
-    let cloud = gather(&Request {
+    Ok(Request {
         file: path.to_owned(),
         format: None,
         frame: 0,
@@ -52,8 +126,10 @@ pub fn load(path: &Path, look: &Look) -> Result<Loaded> {
         coloring: coloring.unwrap_or(Coloring::ElementIfKnown),
         select: None,
         transform: Similarity::IDENTITY,
-    });
-    let cloud = cloud.map_err(|fault| usage(&fault))?;
+    })
+}
+
+fn loaded(path: &Path, look: &Look, cloud: Cloud, view: &View) -> Loaded {
     // Without its ending, and that of gzip before it.
     let plain = match path.extension() {
         Some(ending) if ending.eq_ignore_ascii_case("gz") => path.with_extension(""),
@@ -61,15 +137,16 @@ pub fn load(path: &Path, look: &Look) -> Result<Loaded> {
     };
     let stem = plain.file_stem().unwrap_or_default();
     let name = stem.to_string_lossy().into_owned();
-    let scene = scene(cloud, look.background.unwrap_or(BACKGROUND));
-    Ok(Loaded {
+    let scene = scene(cloud, view, look.background.unwrap_or(BACKGROUND));
+    Loaded {
         hash: content_hash(&scene),
         warnings: Vec::new(),
         source: Source::Particles(look.clone()),
         files: vec![path.to_owned()],
+        frames: None,
         name,
         scene,
-    })
+    }
 }
 
 /// The fault, with the option that a key is.
@@ -86,9 +163,12 @@ fn usage(fault: &Fault) -> Error {
     Error::Usage(format!("{option}{}{help}", fault.message))
 }
 
-fn scene(cloud: Cloud, background: DVec3) -> Scene {
-    let camera = camera(&cloud.balls);
-    let (center, extent) = bounds(&cloud.balls);
+fn scene(cloud: Cloud, view: &View, background: DVec3) -> Scene {
+    let View {
+        camera,
+        center,
+        extent,
+    } = view.clone();
     let mut materials: Vec<Material> = match cloud.colors.is_empty() {
         true => colored(
             vec![("particles".into(), DVec3::splat(0.75))],
@@ -142,19 +222,12 @@ fn scene(cloud: Cloud, background: DVec3) -> Scene {
     }
 }
 
-/// Centre of the box around all, and the distance from there to the farthest surface.
-fn bounds(balls: &[Ball]) -> (DVec3, f64) {
-    let [low, high] = corners(balls);
-    let center = 0.5 * low + 0.5 * high;
-    let reach = balls
-        .iter()
-        .map(|ball| ball.center.distance(center) + ball.radius);
-    (center, reach.fold(0.0, f64::max))
-}
+/// Two corners of a box around nothing.
+const NOWHERE: [DVec3; 2] = [DVec3::INFINITY, DVec3::NEG_INFINITY];
 
-fn corners(balls: &[Ball]) -> [DVec3; 2] {
-    let start = [DVec3::INFINITY, DVec3::NEG_INFINITY];
-    balls.iter().fold(start, |[low, high], ball| {
+/// The corners of a box around these balls too.
+fn around(corners: [DVec3; 2], balls: &[Ball]) -> [DVec3; 2] {
+    balls.iter().fold(corners, |[low, high], ball| {
         [
             low.min(ball.center - ball.radius),
             high.max(ball.center + ball.radius),
@@ -169,40 +242,91 @@ fn axes(from: DVec3, to: DVec3, up: DVec3) -> [DVec3; 3] {
     [forward, right, right.cross(forward)]
 }
 
-/// Along the axis in which the particles extend least, with the longest from left to right, and somewhat from
-/// above and from the side; as near as has all of it in the picture.
-fn camera(balls: &[Ball]) -> Camera {
-    let [low, high] = corners(balls);
-    let extent = high - low;
-    let mut order = [0, 1, 2];
-    // The sort is stable: of equal ones x is across, y upward.
-    order.sort_by(|a, b| extent[*b].total_cmp(&extent[*a]));
-    let axis = |i: usize| [DVec3::X, DVec3::Y, DVec3::Z][order[i]];
-    let (across, upward) = (axis(0), axis(1));
-    let towards = across.cross(upward);
-    let center = 0.5 * low + 0.5 * high;
-    let direction = (towards + 0.25 * across + 0.3 * upward).normalize();
-    let [forward, right, up] = axes(direction, DVec3::ZERO, upward);
-    let half = (0.5 * FOV).to_radians();
-    let aspect = f64::from(SIZE[0]) / f64::from(SIZE[1]);
-    let halves = [(right, (half.tan() * aspect).atan()), (up, half)];
-    // A plane through the camera at the angle a to the axis touches a ball from outside where
-    // (distance - z) sin a - |x| cos a = radius.
-    let needed = balls.iter().flat_map(|ball| {
-        let x = ball.center - center;
-        halves.map(|(axis, a)| {
-            -x.dot(forward) + (ball.radius + x.dot(axis).abs() * a.cos()) / a.sin()
-        })
-    });
-    let distance = MARGIN * needed.fold(0.0, f64::max);
-    Camera {
-        position: center - distance * forward,
-        look_at: center,
-        up: upward,
-        fov: FOV,
-        handedness: Handedness::Right,
-        aperture_radius: 0.0,
-        focus_distance: distance,
+/// From where particles are seen, and how far they reach.
+#[derive(Clone, Debug)]
+struct View {
+    camera: Camera,
+    /// Of the box around them.
+    center: DVec3,
+    /// From there to the farthest surface.
+    extent: f64,
+}
+
+impl View {
+    fn of(balls: &[Ball]) -> Self {
+        let mut framing = Framing::about(around(NOWHERE, balls));
+        framing.add(balls);
+        framing.view()
+    }
+}
+
+/// A view along the axis in which the particles extend least, with the longest from left to right, and somewhat
+/// from above and from the side; as near as has all of them in the picture.
+struct Framing {
+    center: DVec3,
+    forward: DVec3,
+    upward: DVec3,
+    /// The picture's axes, with half of the angle of view along each.
+    halves: [(DVec3, f64); 2],
+    /// The least distance of the camera from the centre.
+    distance: f64,
+    extent: f64,
+}
+
+impl Framing {
+    /// Of particles in the box with these corners.
+    fn about([low, high]: [DVec3; 2]) -> Self {
+        let extent = high - low;
+        let mut order = [0, 1, 2];
+        // The sort is stable: of equal ones x is across, y upward.
+        order.sort_by(|a, b| extent[*b].total_cmp(&extent[*a]));
+        let axis = |i: usize| [DVec3::X, DVec3::Y, DVec3::Z][order[i]];
+        let (across, upward) = (axis(0), axis(1));
+        let towards = across.cross(upward);
+        let direction = (towards + 0.25 * across + 0.3 * upward).normalize();
+        let [forward, right, up] = axes(direction, DVec3::ZERO, upward);
+        let half = (0.5 * FOV).to_radians();
+        let aspect = f64::from(SIZE[0]) / f64::from(SIZE[1]);
+        Self {
+            center: 0.5 * low + 0.5 * high,
+            forward,
+            upward,
+            halves: [(right, (half.tan() * aspect).atan()), (up, half)],
+            distance: 0.0,
+            extent: 0.0,
+        }
+    }
+
+    /// Takes these into the picture.
+    fn add(&mut self, balls: &[Ball]) {
+        for ball in balls {
+            let x = ball.center - self.center;
+            self.extent = self.extent.max(x.length() + ball.radius);
+            // A plane through the camera at the angle a to the axis touches a ball from outside where
+            // (distance - z) sin a - |x| cos a = radius.
+            for (axis, a) in self.halves {
+                let needed =
+                    -x.dot(self.forward) + (ball.radius + x.dot(axis).abs() * a.cos()) / a.sin();
+                self.distance = self.distance.max(needed);
+            }
+        }
+    }
+
+    fn view(&self) -> View {
+        let distance = MARGIN * self.distance;
+        View {
+            camera: Camera {
+                position: self.center - distance * self.forward,
+                look_at: self.center,
+                up: self.upward,
+                fov: FOV,
+                handedness: Handedness::Right,
+                aperture_radius: 0.0,
+                focus_distance: distance,
+            },
+            center: self.center,
+            extent: self.extent,
+        }
     }
 }
 
@@ -249,7 +373,7 @@ mod tests {
                     }
                 };
                 let balls: Vec<Ball> = (0..50).map(|_| ball()).collect();
-                let camera = camera(&balls);
+                let View { camera, .. } = View::of(&balls);
                 let reach_of = |camera: &Camera| reach(camera, &balls);
                 let there = reach_of(&camera);
                 assert!((0.9..1.0).contains(&there), "{shape:?}: {there}");
@@ -271,8 +395,10 @@ mod tests {
         let cloud = Cloud {
             balls: vec![ball],
             colors: Vec::new(),
+            range: None,
         };
-        let scene = scene(cloud, BACKGROUND);
+        let view = View::of(&cloud.balls);
+        let scene = scene(cloud, &view, BACKGROUND);
         let lamp = scene.spheres.last().expect("a lamp");
         let lamp = Ball {
             center: lamp.center,

@@ -5,6 +5,7 @@ pub mod direct;
 pub mod look;
 mod select;
 mod table;
+mod trajectory;
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -12,10 +13,11 @@ use std::path::{Path, PathBuf};
 use glam::{DMat3, DVec3};
 
 pub use color::{Coloring, Map};
-pub(super) use table::{add, problem, request};
+pub(super) use table::{add, flickering, problem, request};
+pub use trajectory::{Frames, Trajectory};
 
 use crate::materials::schema::MAX_MAGNITUDE;
-use crate::particles::{Element, Format, Particles, ReadError, read};
+use crate::particles::{Element, Format, Particles, ReadError, frames, read};
 
 /// What is asked of a particle file.
 #[derive(Clone, Debug)]
@@ -34,6 +36,29 @@ pub struct Request {
     pub select: Option<String>,
     /// From the file's coordinates to the scene's.
     pub transform: Similarity,
+}
+
+impl Request {
+    /// The format that is asked for, or that the file's ending means.
+    fn format(&self) -> Result<Format, Fault> {
+        let format = self.format.or_else(|| Format::of_path(&self.file));
+        format.ok_or_else(|| {
+            let names = Format::ALL.map(Format::name).join(", ");
+            let message = format!(
+                "the ending of {} is none of a format that is known",
+                self.file.display()
+            );
+            Fault::new("file", message).help(format!("`format` is one of {names}"))
+        })
+    }
+
+    /// How many frames the file has.
+    ///
+    /// # Errors
+    /// A [`Fault`] if the file cannot be read.
+    pub fn frames(&self) -> Result<u64, Fault> {
+        frames(&self.file, self.format()?).map_err(|error| unread(&self.file, error))
+    }
 }
 
 /// Where the radii of particles come from.
@@ -146,6 +171,8 @@ pub struct Cloud {
     pub balls: Vec<Ball>,
     /// Names and linear values of the colours; none where nothing colours.
     pub colors: Vec<(String, DVec3)>,
+    /// Where a column colours, its values at the ends of the map.
+    pub range: Option<[f64; 2]>,
 }
 
 /// Reads the file and does what is asked.
@@ -154,14 +181,7 @@ pub struct Cloud {
 /// A [`Fault`] with the key at fault.
 pub fn gather(request: &Request) -> Result<Cloud, Fault> {
     let shown = request.file.display();
-    let format = match request.format.or_else(|| Format::of_path(&request.file)) {
-        Some(format) => format,
-        None => {
-            let names = Format::ALL.map(Format::name).join(", ");
-            let message = format!("the ending of {shown} is none of a format that is known");
-            return Err(Fault::new("file", message).help(format!("`format` is one of {names}")));
-        }
-    };
+    let format = request.format()?;
     let particles =
         read(&request.file, format, request.frame).map_err(|error| unread(&request.file, error))?;
     let selection = request.select.as_deref().map(|text| {
@@ -227,6 +247,7 @@ pub fn gather(request: &Request) -> Result<Cloud, Fault> {
     Ok(Cloud {
         balls,
         colors: painted.colors,
+        range: painted.range,
     })
 }
 

@@ -10,7 +10,8 @@ use super::{Cloud, Coloring, Fault, Map, RadiusBy, Request, Similarity};
 use crate::materials::{self, diffuse};
 use crate::particles::Format;
 
-/// What the table asks for; `None` after errors, which the report then holds.
+/// What the table asks for, in its first frame unless it names one; `None` after errors, which the report then
+/// holds.
 pub(in crate::scene) fn request(
     table: &ParticlesTable,
     folder: &Path,
@@ -112,6 +113,22 @@ fn coloring(table: &ParticlesTable) -> Coloring {
             }
         }
     }
+}
+
+/// The warning of colours that mean something else in each frame.
+pub(in crate::scene) fn flickering(table: &ParticlesTable) -> Option<Problem> {
+    let Coloring::Column {
+        range: None, name, ..
+    } = coloring(table)
+    else {
+        return None;
+    };
+    let span = table.color_by.as_ref()?.span();
+    let message = format!(
+        "the colours of `{}` mean other values in each frame: those at the ends of the map are each frame's own",
+        name.escape_debug()
+    );
+    Some(Problem::new(span, message, "").help("`range = [low, high]` fixes them"))
 }
 
 /// Adds the spheres of a cloud, and the materials of its colours.
