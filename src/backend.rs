@@ -105,6 +105,12 @@ impl Backend {
     /// If the device fails or has not enough memory.
     pub fn renderer(&self, job: &Job) -> Result<Box<dyn Renderer>> {
         let settings = job.settings();
+        if let (Self::Cpu { .. }, Some(view)) = (self, settings.view) {
+            return Err(Error::Usage(format!(
+                "--view {}: the CPU reference has no tree: it asks every sphere",
+                view.name()
+            )));
+        }
         let renderer: Box<dyn Renderer> = match self {
             Self::Gpu(gpu) => Box::new(GpuRenderer::new(Gpu::clone(gpu), job)?),
             Self::Cpu { threads } => Box::new(ReferenceRenderer::new(job, *threads)?),

@@ -11,7 +11,7 @@ use crate::film::PILOT_SAMPLES;
 use crate::placement::media::MAX_LEVELS;
 use crate::placement::{Placement, Side};
 use crate::scene::{MAX_BOUNCES, MAX_SIDE, MAX_SPP, Scene};
-use crate::settings::{GeometryChoice, Integrator, Offset, Settings, TERMINATIONS};
+use crate::settings::{GeometryChoice, Integrator, Offset, Settings, TERMINATIONS, View};
 use crate::variance::{VarianceReport, variance_class};
 
 /// What will be rendered: it has passed all checks.
@@ -39,8 +39,10 @@ pub fn prepare(scene: &Scene, settings: &Settings) -> Result<Job> {
     check_levels(&placement)?;
     check_magnitudes(&placement)?;
     check_lens(scene, &placement)?;
+    let effects = Effects::derive(scene, &placement, settings);
+    check_view(settings, &effects)?;
     Ok(Job {
-        effects: Effects::derive(scene, &placement, settings),
+        effects,
         variance: variance_class(scene, &placement, settings),
         scene: scene.clone(),
         settings: settings.clone(),
@@ -178,6 +180,20 @@ fn check_geometry(scene: &Scene, settings: &Settings) -> Result<()> {
              auto, or use list or bvh",
             scene.spheres.len()
         ));
+    }
+    Ok(())
+}
+
+/// Refuses views of what is not in the kernel.
+fn check_view(settings: &Settings, effects: &Effects) -> Result<()> {
+    if settings.view == Some(View::BvhCost) && !effects.has(Effect::Bvh) {
+        return usage(format!(
+            "--view bvh-cost counts steps through a tree, and the geometry is {}: add --geometry bvh",
+            effects.geometry()
+        ));
+    }
+    if settings.view.is_some() && settings.classes {
+        return usage("--view: the layers of light are none of its image".into());
     }
     Ok(())
 }

@@ -45,6 +45,8 @@ pub struct Settings {
     pub roulette: bool,
     /// The form of the geometry in the kernel.
     pub geometry: GeometryChoice,
+    /// What the image shows; `None`: light.
+    pub view: Option<View>,
     /// How a path leaves a surface.
     pub offset: Offset,
     /// Whether a pilot decides where samples go; `samples` are then those a pixel on average, with it.
@@ -86,6 +88,7 @@ impl Settings {
             sampler: Sampler::default(),
             roulette: true,
             geometry: GeometryChoice::Auto,
+            view: None,
             offset: Offset::Exact,
             adaptive: false,
             classes: false,
@@ -235,6 +238,26 @@ impl GeometryChoice {
             Self::Baked => "baked",
             Self::List => "list",
             Self::Bvh => "bvh",
+        }
+    }
+}
+
+/// What the image shows in the place of light.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum View {
+    /// Steps through the tree that a sample takes, over all its rays: a node's boxes, a leaf's spheres, or both.
+    BvhCost,
+}
+
+impl View {
+    /// All of them.
+    pub const ALL: &'static [Self] = &[Self::BvhCost];
+
+    /// The name on the command line.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::BvhCost => "bvh-cost",
         }
     }
 }

@@ -15,7 +15,7 @@ use gpu_trace::placement::Placement;
 use gpu_trace::placement::lights::MOST_WEIGHED;
 use gpu_trace::sampler::Sampler;
 use gpu_trace::scene::{Camera, Handedness, Material, RenderDefaults, Scene, Sphere};
-use gpu_trace::settings::{GeometryChoice, Integrator, LightSampling, Offset, Settings};
+use gpu_trace::settings::{GeometryChoice, Integrator, LightSampling, Offset, Settings, View};
 use gpu_trace::shader::{Kernel, Stage, declared_names, link};
 use gpu_trace::verify::Random;
 use rayon::prelude::*;
@@ -48,7 +48,10 @@ fn completed(set: impl IntoIterator<Item = Effect>) -> Option<Set> {
         // What scenes here have within glass, and through a lens.
         set.insert(opaque);
     }
-    if ![Effect::List, Effect::Bvh].iter().any(|e| set.contains(e)) {
+    if ![Effect::List, Effect::Bvh, Effect::BvhCost]
+        .iter()
+        .any(|e| set.contains(e))
+    {
         set.insert(Effect::Baked);
     }
     loop {
@@ -211,6 +214,7 @@ fn asking_for(set: &Set) -> (Scene, Settings) {
         adaptive: has(Effect::Adaptive),
         classes: has(Effect::Classes),
         features: has(Effect::Features),
+        view: has(Effect::BvhCost).then_some(View::BvhCost),
         sampler: match has(Effect::Sobol) {
             true => Sampler::Sobol,
             false => Sampler::Independent,

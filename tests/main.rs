@@ -52,4 +52,5 @@ mod scene;
 mod sobol;
 mod stream;
 mod variance_law;
+mod view;
 mod walls;

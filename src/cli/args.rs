@@ -19,7 +19,7 @@ use crate::scene::particles::{Frames, Map};
 use crate::scene::{Loaded, MAX_BOUNCES, Scene, builtin};
 use crate::settings::{
     DEFAULT_TERMINATION, GeometryChoice, Integrator, LightSampling, MAXIMUM_SPP, Offset, Rect,
-    Settings,
+    Settings, View,
 };
 
 /// The options of `render`.
@@ -66,6 +66,15 @@ pub struct RenderArgs {
         help = "Brighten the PNG by a factor of 2^EV"
     )]
     pub exposure: f64,
+    #[arg(
+        long,
+        value_name = "NAME",
+        value_enum,
+        hide_possible_values = true,
+        help_heading = "Output",
+        help = "Show something else than light: bvh-cost, the steps through the tree that a sample takes"
+    )]
+    pub view: Option<View>,
     #[arg(
         long,
         value_name = "FILE",
@@ -410,6 +419,7 @@ impl RenderArgs {
             roulette: !self.integrator.is_lecture() && self.roulette != Some(false),
             sampler: self.sampler,
             geometry: self.geometry,
+            view: self.view,
             offset: self.offset,
             adaptive: self.adaptive,
             classes: self.aov.iter().any(|aov| aov.class().is_some()),

@@ -6,7 +6,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use crate::backend::BackendKind;
 use crate::sampler::Sampler;
 use crate::scene::particles::Map;
-use crate::settings::{GeometryChoice, Integrator, LightSampling};
+use crate::settings::{GeometryChoice, Integrator, LightSampling, View};
 
 /// Lets `value_enum` take the names of a type's `ALL`.
 macro_rules! choices {
@@ -25,7 +25,7 @@ macro_rules! choices {
     };
 }
 
-choices! { Integrator, LightSampling, Sampler, GeometryChoice }
+choices! { Integrator, LightSampling, Sampler, GeometryChoice, View }
 
 /// What should render.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -48,7 +48,12 @@ impl HeatMap {
     /// The map of two pictures of the same size.
     #[must_use]
     pub fn of(image: &Picture, reference: &Picture) -> Self {
-        let errors = error::map(image, reference);
+        Self::new(image.width, error::map(image, reference))
+    }
+
+    /// The map of any numbers, row by row.
+    #[must_use]
+    pub fn new(width: u32, errors: Vec<f64>) -> Self {
         let mut sorted: Vec<f64> = errors.iter().copied().filter(|e| e.is_finite()).collect();
         sorted.sort_by(f64::total_cmp);
         let high = sorted
@@ -57,18 +62,16 @@ impl HeatMap {
         let range = round_up(high.unwrap_or(0.0));
         let beyond = errors.iter().filter(|e| **e > range).count();
         Self {
-            width: image.width,
+            width,
             beyond: beyond as f64 / errors.len() as f64,
             errors,
             range,
         }
     }
 
-    /// The bytes of a PNG file, whose comment says the range.
-    ///
-    /// # Errors
-    /// If the size is beyond what PNG can hold.
-    pub fn encode(&self) -> io::Result<Vec<u8>> {
+    /// Its colours.
+    #[must_use]
+    pub fn picture(&self) -> Picture {
         let colour = |error: &f64| match error.is_nan() {
             true => UNKNOWN,
             false => colour(error / self.range),
@@ -77,8 +80,16 @@ impl HeatMap {
         let level = |level: u8| linear(f64::from(level) / 255.0) as f32;
         let pixels: Vec<[f32; 3]> = self.errors.iter().map(|e| colour(e).map(level)).collect();
         let height = (pixels.len() / self.width as usize) as u32;
+        Picture::new(self.width, height, pixels)
+    }
+
+    /// The bytes of a PNG file, whose comment says the range.
+    ///
+    /// # Errors
+    /// If the size is beyond what PNG can hold.
+    pub fn encode(&self) -> io::Result<Vec<u8>> {
         let contents = Contents {
-            picture: &Picture::new(self.width, height, pixels),
+            picture: &self.picture(),
             layers: &[],
             metadata: &Metadata::new()
                 .with(

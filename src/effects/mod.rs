@@ -54,6 +54,8 @@ pub enum Effect {
     Classes,
     /// What is seen first.
     Features,
+    /// Steps through the tree in the place of light.
+    BvhCost,
     /// Some tiles only.
     Adaptive,
     /// A form of a material, by its code.

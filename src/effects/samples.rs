@@ -2,6 +2,7 @@
 
 use super::{Effect, Row, when};
 use crate::sampler::Sampler;
+use crate::settings::View;
 
 pub(super) fn rows() -> Vec<Row> {
     let aov = |wanted: bool| when(wanted, || "--aov".into());
@@ -54,6 +55,17 @@ pub(super) fn rows() -> Vec<Row> {
             "features_albedo",
             "features_depth",
         ]),
+        Row::new(
+            Effect::BvhCost,
+            "bvh_cost",
+            "an image of steps through the tree in the place of light",
+            |asked| {
+                let wanted = asked.settings.view == Some(View::BvhCost);
+                when(wanted, || "--view bvh-cost".into())
+            },
+        )
+        .needs([Effect::Bvh])
+        .marks(["cost"]),
         Row::new(
             Effect::Adaptive,
             "adaptive",

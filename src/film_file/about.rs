@@ -276,6 +276,7 @@ impl Choices {
             adaptive: self.adaptive,
             classes: self.classes,
             features: self.features,
+            view: None,
             error: goal.error,
             time: time.map_err(|e| format!("its time: {e}"))?,
         })

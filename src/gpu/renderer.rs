@@ -118,7 +118,11 @@ impl GpuRenderer {
             sampler: settings.sampler,
             aovs,
             side,
-            radiance_scale: placement.radiance_scale,
+            // Steps have no unit.
+            radiance_scale: match settings.view {
+                None => placement.radiance_scale,
+                Some(_) => 1.0,
+            },
             pace: Pace::unknown(),
             step_limit: step_limit(placement, effects, settings.max_bounces, gl),
         })

@@ -8,6 +8,7 @@ mod resume;
 mod session;
 mod statistics;
 mod summary;
+mod view;
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -103,6 +104,12 @@ fn request(args: &RenderArgs, loaded: Loaded) -> Result<Request> {
     outputs.extend(args.dump_wgsl.as_deref());
     outputs.extend(args.checkpoint.as_deref());
     if let Some(path) = &args.checkpoint {
+        if let Some(view) = args.view {
+            return Err(Error::Usage(format!(
+                "--checkpoint keeps light, and --view {} is none",
+                view.name()
+            )));
+        }
         checkpoint::check_new(path)?;
     }
     check_all(&outputs, &loaded.inputs())?;
@@ -141,7 +148,10 @@ fn finish(args: &RenderArgs, request: &Request, outcome: &Outcome, stats: &Stats
         exposure: args.exposure,
     };
     // The statistics are worth having even if an image cannot be written.
-    let written = write_all(&request.targets, &contents);
+    let written = match args.view {
+        None => write_all(&request.targets, &contents),
+        Some(view) => view::write(view, &request.targets, &contents),
+    };
     if let Some(path) = &args.stats {
         stats.write(path)?;
     }
@@ -149,7 +159,8 @@ fn finish(args: &RenderArgs, request: &Request, outcome: &Outcome, stats: &Stats
     if args.quiet {
         Ok(())
     } else {
-        print(&summary(&request.files(args), stats))
+        let shown = args.view.map(|view| view::summary(view, &picture));
+        print(&summary(&request.files(args), stats, shown.as_deref()))
     }
 }
 

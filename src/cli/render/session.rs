@@ -176,7 +176,7 @@ impl Session {
         outcome: &Outcome,
         warnings: &mut Vec<String>,
     ) -> Option<Vec<Entry>> {
-        if is_cut(outcome) {
+        if is_cut(outcome) || job.settings().view.is_some() {
             return None;
         }
         let go_on = || self.signals.code().is_none();

@@ -10,8 +10,9 @@ use crate::render::{Outcome, StoppedBy};
 use crate::settings::Settings;
 use crate::variance::VarianceClass;
 
-/// The line about a render at its end; `files` names its images.
-pub(super) fn summary(files: &str, stats: &Stats) -> String {
+/// The line about a render at its end; `files` names its images, and `shown` says what they show if that is no
+/// light.
+pub(super) fn summary(files: &str, stats: &Stats, shown: Option<&str>) -> String {
     let error = match stats.estimated_error {
         Some(error) => format!("error {}", percent(error)),
         None if stats.black => "black".into(),
@@ -28,6 +29,7 @@ pub(super) fn summary(files: &str, stats: &Stats) -> String {
         StoppedBy::Interrupt => ", interrupted",
         StoppedBy::Failure => ", failed",
     };
+    let shown = shown.map_or_else(String::new, |text| format!("{text}, "));
     let [least, most] = stats.spp_range;
     let range = if least < most {
         format!(" ({least} to {most})")
@@ -49,7 +51,7 @@ pub(super) fn summary(files: &str, stats: &Stats) -> String {
         )
     });
     format!(
-        "{}: {}x{}, {} spp{range}{stopped}, {error}{cut}{taken}{lost}, {:.2} s, {} Mpaths/s on {}\n",
+        "{}: {}x{}, {} spp{range}{stopped}, {shown}{error}{cut}{taken}{lost}, {:.2} s, {} Mpaths/s on {}\n",
         files,
         stats.width,
         stats.height,
