@@ -3,6 +3,10 @@
 //! Part of the placement: geometry in f64, decided once, so that f32 is never asked.
 
 use std::collections::HashMap;
+use std::hash::BuildHasherDefault;
+
+use fnv::FnvHasher;
+use rayon::prelude::*;
 
 use super::media::precedes;
 use super::sphere::{ROUNDING, Side};
@@ -27,7 +31,7 @@ const CLOSE: f64 = 1.0 / 1024.0;
 #[must_use]
 pub fn reachable(scene: &Scene, sides: &[Side], coincident: &mut Vec<[usize; 2]>) -> Vec<bool> {
     let mut reachable = vec![true; scene.spheres.len()];
-    let mut places: HashMap<[u64; 4], usize> = HashMap::new();
+    let mut places: HashMap<[u64; 4], usize, BuildHasherDefault<FnvHasher>> = HashMap::default();
     for (i, sphere) in scene.spheres.iter().enumerate() {
         let key = [
             sphere.center.x,
@@ -54,9 +58,10 @@ pub fn reachable(scene: &Scene, sides: &[Side], coincident: &mut Vec<[usize; 2]>
         if !reachable[wall] {
             continue;
         }
-        for (i, reachable) in reachable.iter_mut().enumerate() {
+        let all = reachable.par_iter_mut().enumerate();
+        all.for_each(|(i, reachable)| {
             *reachable &= i == wall || !hides(scene, wall, sides[wall], i);
-        }
+        });
     }
     reachable
 }

@@ -17,6 +17,9 @@ use glam::DVec3;
 /// Balls in one leaf.
 const LEAF: usize = 8;
 
+/// Balls from which on the halves of a node are built side by side.
+const PARALLEL: usize = 16384;
+
 /// What is known of some balls together.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bounds {
@@ -81,6 +84,64 @@ struct Node {
     second: Option<usize>,
 }
 
+impl Node {
+    /// The same with all indices of nodes larger by `shift`.
+    fn shifted(self, shift: usize) -> Self {
+        Self {
+            parent: self.parent.map(|node| node + shift),
+            second: self.second.map(|node| node + shift),
+            ..self
+        }
+    }
+}
+
+/// Adds the node of `items`, which are those from `from` on, and all below it to `nodes`.
+fn build(nodes: &mut Vec<Node>, balls: &[(DVec3, f64)], items: &mut [usize], from: usize) {
+    let node = nodes.len();
+    let bounds = Bounds::of(balls, items);
+    nodes.push(Node {
+        bounds,
+        parent: None,
+        from,
+        to: from + items.len(),
+        second: None,
+    });
+    if items.len() <= LEAF {
+        return;
+    }
+    let wide = (bounds.high - bounds.low).extend(bounds.most - bounds.least);
+    let axis = wide.max_position();
+    let key = |ball: &usize| {
+        let (center, radius) = balls[*ball];
+        center.extend(radius)[axis]
+    };
+    let half = items.len() / 2;
+    items.select_nth_unstable_by(half, |a, b| key(a).total_cmp(&key(b)));
+    let many = items.len() >= PARALLEL;
+    let (lower, upper) = items.split_at_mut(half);
+    let second = if many {
+        let half_of = |items: &mut [usize], from: usize| {
+            let mut nodes = Vec::new();
+            build(&mut nodes, balls, items, from);
+            nodes
+        };
+        let (lower, upper) = rayon::join(|| half_of(lower, from), || half_of(upper, from + half));
+        let second = node + 1 + lower.len();
+        nodes.extend(lower.into_iter().map(|n| n.shifted(node + 1)));
+        nodes.extend(upper.into_iter().map(|n| n.shifted(second)));
+        second
+    } else {
+        build(nodes, balls, lower, from);
+        let second = nodes.len();
+        build(nodes, balls, upper, from + half);
+        second
+    };
+    for half in [node + 1, second] {
+        nodes[half].parent = Some(node);
+    }
+    nodes[node].second = Some(second);
+}
+
 /// Balls, halved again and again along the widest of x, y, z and radius.
 #[derive(Debug, Default)]
 pub(super) struct Tree {
@@ -93,52 +154,24 @@ pub(super) struct Tree {
 impl Tree {
     /// A tree of balls, as centre and radius.
     pub(super) fn new(balls: &[(DVec3, f64)]) -> Self {
-        let mut tree = Self {
-            nodes: Vec::new(),
-            items: (0..balls.len()).collect(),
-            leaves: vec![0; balls.len()],
-        };
-        if !balls.is_empty() {
-            tree.build(balls, None, 0, balls.len());
+        let mut items: Vec<usize> = (0..balls.len()).collect();
+        let mut nodes = Vec::new();
+        if !items.is_empty() {
+            build(&mut nodes, balls, &mut items, 0);
         }
-        tree
-    }
-
-    fn build(
-        &mut self,
-        balls: &[(DVec3, f64)],
-        parent: Option<usize>,
-        from: usize,
-        to: usize,
-    ) -> usize {
-        let node = self.nodes.len();
-        let items = &mut self.items[from..to];
-        let bounds = Bounds::of(balls, items);
-        self.nodes.push(Node {
-            bounds,
-            parent,
-            from,
-            to,
-            second: None,
-        });
-        if items.len() <= LEAF {
-            for ball in items {
-                self.leaves[*ball] = node;
+        let mut leaves = vec![0; balls.len()];
+        for (i, node) in nodes.iter().enumerate() {
+            if node.second.is_none() {
+                for ball in &items[node.from..node.to] {
+                    leaves[*ball] = i;
+                }
             }
-            return node;
         }
-        let wide = (bounds.high - bounds.low).extend(bounds.most - bounds.least);
-        let axis = wide.max_position();
-        let key = |ball: &usize| {
-            let (center, radius) = balls[*ball];
-            center.extend(radius)[axis]
-        };
-        let half = items.len() / 2;
-        items.select_nth_unstable_by(half, |a, b| key(a).total_cmp(&key(b)));
-        self.build(balls, Some(node), from, from + half);
-        let second = self.build(balls, Some(node), from + half, to);
-        self.nodes[node].second = Some(second);
-        node
+        Self {
+            nodes,
+            items,
+            leaves,
+        }
     }
 
     /// Raises the mark of `ball` to at least `mark`.
@@ -205,5 +238,82 @@ impl Tree {
             |found, ball| *found |= is(ball),
         );
         found
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::verify::Random;
+
+    fn balls(count: usize) -> Vec<(DVec3, f64)> {
+        let mut random = Random::new("balls in a tree of the placement");
+        let mut ball = || {
+            let [x, y, z, r] = random.unit4().map(f64::from);
+            (DVec3::new(x, y, z), r)
+        };
+        (0..count).map(|_| ball()).collect()
+    }
+
+    /// The nearest of the balls to a point, by the tree.
+    fn nearest(tree: &Tree, balls: &[(DVec3, f64)], point: DVec3) -> usize {
+        let mut answer = (f64::INFINITY, 0);
+        tree.search(
+            &mut answer,
+            |(best, _), bounds| Some(-bounds.nearest(point)).filter(|near| -near < *best),
+            |answer, ball| {
+                let distance = balls[ball].0.distance(point);
+                if distance < answer.0 {
+                    *answer = (distance, ball);
+                }
+            },
+        );
+        answer.1
+    }
+
+    #[test]
+    fn trees_built_side_by_side_are_one_tree() {
+        let balls = balls(5 * PARALLEL);
+        let mut tree = Tree::new(&balls);
+        for (i, node) in tree.nodes.iter().enumerate() {
+            let Some(second) = node.second else {
+                continue;
+            };
+            let halves = [&tree.nodes[i + 1], &tree.nodes[second]];
+            assert!(halves.iter().all(|half| half.parent == Some(i)));
+            assert_eq!(
+                [halves[0].from, halves[0].to, halves[1].from, halves[1].to],
+                [node.from, halves[1].from, halves[0].to, node.to]
+            );
+        }
+        assert!((0..balls.len()).all(|ball| {
+            let leaf = &tree.nodes[tree.leaves[ball]];
+            leaf.second.is_none() && tree.items[leaf.from..leaf.to].contains(&ball)
+        }));
+        let points: Vec<DVec3> = balls
+            .iter()
+            .step_by(4001)
+            .map(|b| b.0 * 1.1 - 0.05)
+            .collect();
+        for point in &points {
+            let distance = |ball: &usize| balls[*ball].0.distance(*point);
+            let brute = (0..balls.len()).min_by(|a, b| distance(a).total_cmp(&distance(b)));
+            assert_eq!(Some(nearest(&tree, &balls, *point)), brute);
+        }
+        tree.mark(77, 5);
+        assert_eq!((tree.nodes[0].bounds.mark, mark_at(&tree, 77)), (5, 5));
+        // Companion: with the second half of the root taken for a part of the first, answers are missed.
+        tree.nodes[0].second = Some(1);
+        let missed = points.iter().filter(|point| {
+            let distance = |ball: usize| balls[ball].0.distance(**point);
+            let found = distance(nearest(&tree, &balls, **point));
+            (0..balls.len()).any(|ball| distance(ball) < found)
+        });
+        assert!(missed.count() > points.len() / 4);
+    }
+
+    /// The mark of the leaf of a ball.
+    fn mark_at(tree: &Tree, ball: usize) -> u32 {
+        tree.nodes[tree.leaves[ball]].bounds.mark
     }
 }
