@@ -8,6 +8,7 @@ mod loading;
 #[expect(dead_code, reason = "f64 is for `hazards` and the tests")]
 mod naive;
 mod offsets;
+mod roofline;
 mod trees;
 
 use std::time::Instant;
@@ -50,6 +51,9 @@ fn main() {
     }
     if chosen("trees") {
         trees::run();
+    }
+    if chosen("roofline") {
+        roofline::run();
     }
     if chosen("offsets") {
         offsets::run();
@@ -137,17 +141,21 @@ fn compare(title: &str, contestants: &mut [(&str, Contestant<'_>)]) {
     for ((name, _), own) in contestants.iter().zip(&rates) {
         let mut ratios: Vec<f64> = own.iter().zip(&rates[0]).map(|(a, b)| a / b).collect();
         ratios.sort_by(f64::total_cmp);
-        let mut sorted = own.clone();
-        sorted.sort_by(f64::total_cmp);
         println!(
             "| {name} | {:.2} | {:.2} | {:.2} | {:.2} |",
-            sorted[ROUNDS / 2] * 1.0e-6,
+            median(own.clone()) * 1.0e-6,
             ratios[ROUNDS / 2],
             ratios[0],
             ratios[ROUNDS - 1],
         );
     }
     println!();
+}
+
+/// The middle one of an odd number.
+fn median(mut numbers: Vec<f64>) -> f64 {
+    numbers.sort_by(f64::total_cmp);
+    numbers[numbers.len() / 2]
 }
 
 fn against_naive() {

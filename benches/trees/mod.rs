@@ -62,7 +62,7 @@ pub(crate) fn run() {
 }
 
 /// Gray balls in a cube, one in each unit of its volume, under a white sky.
-fn crowd(count: usize) -> Scene {
+pub(crate) fn crowd(count: usize) -> Scene {
     let side = (count as f64).cbrt();
     let mut random = Random::new("trees");
     let mut sphere = || Sphere {

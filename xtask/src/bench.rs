@@ -13,6 +13,7 @@ Usage: cargo xtask bench [TABLE...] [--quick]
   offsets    ways to leave a surface: what each gets wrong, and costs
   geometry   spheres as constants or in a buffer
   trees      a loop over all spheres against a tree, for 32 to 1e6 of them
+  roofline   the peak of the ray-sphere test on the device, and what share of it scenes reach
   loading    from a scene file to the first dispatch: each stage for 1e3, 1e4 and 1e5 spheres
   forecasts  what price says of five scenes, and what the renders then take (some minutes)
   resources  time to the first window, peak memory
@@ -28,11 +29,12 @@ Without a name: all but forecasts, peers, hazards and coverage. Run it on an idl
 
 /// Runs the benchmarks named in `tables`.
 pub(crate) fn all(tables: &[String]) -> Result<(), String> {
-    const KNOWN: [&str; 11] = [
+    const KNOWN: [&str; 12] = [
         "naive",
         "unused",
         "geometry",
         "trees",
+        "roofline",
         "offsets",
         "loading",
         "resources",
@@ -55,7 +57,7 @@ pub(crate) fn all(tables: &[String]) -> Result<(), String> {
     }
     let chosen = |name: &str| tables.is_empty() || tables.iter().any(|t| t == name);
     run(cargo().args(["build", "--release"]))?;
-    let in_process: Vec<&str> = KNOWN[..6]
+    let in_process: Vec<&str> = KNOWN[..7]
         .iter()
         .copied()
         .filter(|name| chosen(name))
