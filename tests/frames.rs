@@ -153,6 +153,38 @@ fn a_signal_leaves_what_is_complete_and_says_how_to_go_on() {
 }
 
 #[test]
+fn frames_before_the_first_particle_are_empty() {
+    let folder = folder();
+    let frame = |step: u32, atoms: &str| {
+        let count = atoms.lines().count();
+        format!(
+            "ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF ATOMS\n{count}\nITEM: BOX BOUNDS pp pp pp\n0 9\n0 9\n0 9\n\
+             ITEM: ATOMS id type radius x y z vz\n{atoms}"
+        )
+    };
+    let two = "1 1 1.0 2 2 2 -1\n2 1 0.5 5 5 5 -2\n";
+    folder.write("pour.dump", frame(0, "") + &frame(10, two));
+    folder.write("nothing.dump", frame(0, "") + &frame(10, ""));
+    folder.ok(&format!(
+        "pour.dump --frames 0.. --color-by vz {SMALL} -o a{{frame}}.npy"
+    ));
+    let white = |name: &str| {
+        folder
+            .npy(name)
+            .pixels
+            .iter()
+            .all(|pixel| *pixel == [1.0; 3])
+    };
+    assert!(white("a0.npy") && !white("a1.npy"));
+    holds(
+        &folder.refused(&["nothing.dump", "--frames", "0.."]),
+        &["nothing.dump", "no frame"],
+    );
+    // Without a choice of frames, the first is what was asked for.
+    holds(&folder.refused(&["pour.dump"]), &["no particles"]);
+}
+
+#[test]
 fn what_cannot_be_is_refused() {
     let folder = folder();
     let before = folder.snapshot();

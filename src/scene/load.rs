@@ -14,11 +14,14 @@ use toml::de::{DeTable, Deserializer};
 use super::file::{SceneFile, json_schema};
 use super::particles::look::Look;
 use super::report::{Problem, Report};
-use super::{Scene, content_hash, shape, validate};
+use super::{Scene, content_hash, pieces, shape, validate};
 use crate::error::{Action, Error, Result};
 
 /// The largest scene file that is read, in bytes; about three million spheres.
 const MAX_FILE_SIZE: u64 = 256 << 20;
+
+/// From this size on, in bytes, lists of spheres are parsed by pieces.
+const LONG: usize = 1 << 20;
 
 /// A scene with what there is to say about it.
 #[derive(Clone, Debug, PartialEq)]
@@ -216,6 +219,11 @@ fn load(
 fn parse(text: &str, place: Place<'_>, report: &mut Report) -> Option<Parsed> {
     static SCHEMA: LazyLock<serde_json::Value> = LazyLock::new(json_schema);
 
+    if text.len() >= LONG
+        && let Some((file, keys)) = pieces::parse(text, &SCHEMA)
+    {
+        return validate::scene(file, &keys, place, report);
+    }
     let root = DeTable::parse(text).map_err(|error| report.errors.push(syntax(&error)));
     let root = root.ok()?;
     if root.get_ref().is_empty() {

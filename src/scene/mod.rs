@@ -10,6 +10,7 @@ mod file;
 mod hash;
 pub mod load;
 pub mod particles;
+mod pieces;
 #[cfg(test)]
 mod properties;
 mod range;

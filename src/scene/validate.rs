@@ -147,6 +147,7 @@ pub(super) fn scene(
             match request.frames() {
                 Ok(there) if there > 1 => {
                     request.frame = frame;
+                    request.may_be_empty = true;
                     frames = Some(frames.map_or(there, |other| other.min(there)));
                     report.warnings.extend(particles::flickering(table));
                 }

@@ -63,6 +63,7 @@ impl Movie {
         let cloud = |frame| {
             let request = Request {
                 frame,
+                may_be_empty: true,
                 ..request.clone()
             };
             gather(&request).map_err(|fault| usage(&fault))
@@ -76,6 +77,10 @@ impl Movie {
                 (Some([a, b]), Some([c, d])) => Some([a.min(c), b.max(d)]),
                 (_, new) => new,
             };
+        }
+        if corners == NOWHERE {
+            let text = format!("no frame of {} has particles", path.display());
+            return Err(Error::Usage(text));
         }
         let mut framing = Framing::about(corners);
         for frame in &frames {
@@ -99,6 +104,7 @@ impl Movie {
     pub(super) fn load(&self, frame: u64) -> Result<Loaded> {
         let request = Request {
             frame,
+            may_be_empty: true,
             ..self.request.clone()
         };
         let cloud = gather(&request).map_err(|fault| usage(&fault))?;
@@ -122,6 +128,7 @@ fn request(path: &Path, look: &Look) -> Result<Request> {
         file: path.to_owned(),
         format: None,
         frame: 0,
+        may_be_empty: false,
         radius,
         coloring: coloring.unwrap_or(Coloring::ElementIfKnown),
         select: None,

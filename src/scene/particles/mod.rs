@@ -28,6 +28,8 @@ pub struct Request {
     pub format: Option<Format>,
     /// The frame; 0 is the first.
     pub frame: u64,
+    /// Whether the file may have no particles there, as one of several frames.
+    pub may_be_empty: bool,
     /// The radius of each particle; `None`: a column `radius`, else van der Waals radii.
     pub radius: Option<RadiusBy>,
     /// The colour of each particle.
@@ -197,7 +199,7 @@ pub fn gather(request: &Request) -> Result<Cloud, Fault> {
             .is_none_or(|s| s.keeps(&particles, *index))
     };
     let kept: Vec<usize> = (0..particles.positions.len()).filter(kept).collect();
-    if kept.is_empty() {
+    if kept.is_empty() && !request.may_be_empty {
         return Err(match request.select {
             Some(_) => Fault::new(
                 "select",

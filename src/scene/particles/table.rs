@@ -93,6 +93,7 @@ pub(in crate::scene) fn request(
         file: folder.join(table.file.get_ref()),
         format: table.format.as_ref().and_then(named),
         frame: table.frame.unwrap_or_default(),
+        may_be_empty: false,
         radius,
         coloring,
         select: table.select.as_ref().map(|select| select.get_ref().clone()),

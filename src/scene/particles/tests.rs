@@ -19,6 +19,7 @@ fn request(folder: &tempfile::TempDir, name: &str) -> Request {
         file: folder.path().join(name),
         format: None,
         frame: 0,
+        may_be_empty: false,
         radius: None,
         coloring: Coloring::None,
         select: None,
