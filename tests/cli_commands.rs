@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 /// All commands, and all options of `render`.
 const COMMANDS: &str =
-    "render resume merge effects price check compare converge devices scene completions man";
+    "render resume merge submit effects price check compare converge devices scene completions man";
 const OPTIONS: &str = "--output --stats --aov --exposure --dump-wgsl --progress --quiet --verbose \
     --spp --adaptive --error --time --sample-range --size --crop --seed --integrator \
     --light-sampling --sampler --max-bounces \
