@@ -3,7 +3,7 @@
 use std::fs;
 use std::net::TcpListener;
 use std::os::unix::fs::PermissionsExt as _;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::{Command, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
@@ -28,6 +28,8 @@ const INSTALL: &str = "\
 these tests start a Slurm of their own, which has to be installed, and nothing of which has to run:
   Debian, Ubuntu   apt-get install --no-install-recommends slurm-wlm munge
   Fedora           dnf install slurm-slurmctld slurm-slurmd munge";
+/// What is started, in the order in which it is stopped.
+const DAEMONS: [&str; 3] = ["slurmd", "slurmctld", "munged"];
 /// Until the node is there.
 const PATIENCE: Duration = Duration::from_secs(60);
 
@@ -103,7 +105,8 @@ impl Slurm {
         slurm.daemon("slurmctld", &["-c"])?;
         slurm.daemon("slurmd", &["-c", "-N", "localhost"])?;
         let begin = Instant::now();
-        while slurm.state() != "idle" {
+        let runs = |name: &str| slurm.process(name).is_some();
+        while slurm.state() != "idle" || !DAEMONS.into_iter().all(runs) {
             if begin.elapsed() > PATIENCE {
                 return Err(format!(
                     "Slurm's node does not come: it is {:?}\n{}",
@@ -189,6 +192,32 @@ impl Slurm {
         )
     }
 
+    /// The process of a daemon, if it runs.
+    fn process(&self, name: &str) -> Option<String> {
+        let text = fs::read_to_string(self.folder.join(format!("{name}.pid"))).ok()?;
+        Some(text.trim().to_owned()).filter(|process| !process.is_empty())
+    }
+
+    /// Ends a daemon, and waits until it has.
+    fn stop(&self, name: &str) {
+        let Some(process) = self.process(name) else {
+            return;
+        };
+        let signal = |signal: &str| {
+            let mut kill = Command::new("kill");
+            let status = kill
+                .args(["-s", signal, &process])
+                .stderr(Stdio::null())
+                .status();
+            status.is_ok_and(|status| status.success())
+        };
+        signal("TERM");
+        let begin = Instant::now();
+        while signal("0") && begin.elapsed() < Duration::from_secs(10) {
+            sleep(Duration::from_millis(100));
+        }
+    }
+
     fn logs(&self) -> String {
         let log = |name: &str| fs::read_to_string(self.folder.join(name)).unwrap_or_default();
         ["munged.log", "slurmctld.log", "slurmd.log"]
@@ -199,26 +228,11 @@ impl Slurm {
 
 impl Drop for Slurm {
     fn drop(&mut self) {
-        // What does not run cannot be stopped.
-        let mut shutdown = Command::new("scontrol");
-        shutdown
-            .arg("shutdown")
-            .env("SLURM_CONF", self.configuration());
-        let _ = shutdown.stderr(Stdio::null()).status();
-        if let Ok(process) = fs::read_to_string(self.folder.join("munged.pid")) {
-            let _ = Command::new("kill").arg(process.trim()).status();
+        // The controller last of Slurm's, and munge last of all.
+        for name in DAEMONS {
+            self.stop(name);
         }
-        wait_for(&self.folder, &["slurmctld.pid", "slurmd.pid"]);
         let _ = fs::remove_dir_all(&self.folder);
-    }
-}
-
-/// Waits until daemons have removed what says that they run.
-fn wait_for(folder: &Path, names: &[&str]) {
-    let begin = Instant::now();
-    let runs = || names.iter().any(|name| folder.join(name).exists());
-    while runs() && begin.elapsed() < Duration::from_secs(10) {
-        sleep(Duration::from_millis(100));
     }
 }
 
