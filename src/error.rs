@@ -45,6 +45,9 @@ pub enum Error {
     /// A hard case failed on the device.
     #[error("{0}")]
     Check(String),
+    /// Slurm is not here, or takes no job.
+    #[error("{0}")]
+    Slurm(String),
     /// The program was told to stop.
     #[error("interrupted")]
     Interrupted(i32),

@@ -8,12 +8,12 @@ use serde_json::{Value, json};
 
 /// All commands, and all options of `render`.
 const COMMANDS: &str =
-    "render resume merge effects price check compare converge devices scene completions man";
+    "render resume merge submit effects price check compare converge devices scene completions man";
 const OPTIONS: &str = "--output --stats --aov --exposure --dump-wgsl --progress --quiet --verbose \
     --spp --adaptive --error --time --sample-range --size --crop --seed --integrator \
     --light-sampling --sampler --max-bounces \
     --roulette --termination --backend --device --offset --geometry --threads --allow-non-finite \
-    --color-by --radius-by --map --background --checkpoint --checkpoint-every";
+    --color-by --radius-by --map --background --frames --view --checkpoint --checkpoint-every";
 
 #[test]
 fn the_kernel_holds_what_the_scene_asks_for() {

@@ -17,17 +17,17 @@ use serde_json::{Value, json};
 const SCENE: &str = "good.toml --backend cpu";
 
 /// Whether all values are within one ulp of f32.
-fn alike(a: &Picture, b: &Picture) -> bool {
+pub(crate) fn alike(a: &Picture, b: &Picture) -> bool {
     let pairs = bits(a).into_iter().zip(bits(b));
     pairs.into_iter().all(|(a, b)| a.abs_diff(b) <= 1)
 }
 
 /// Whether these are within one ulp of f32.
-fn near(a: f64, b: f64) -> bool {
+pub(crate) fn near(a: f64, b: f64) -> bool {
     (a as f32).to_bits().abs_diff((b as f32).to_bits()) <= 1
 }
 
-fn error_of(stats: &Value) -> f64 {
+pub(crate) fn error_of(stats: &Value) -> f64 {
     stats["estimated_error"].as_f64().expect("an error")
 }
 

@@ -49,6 +49,7 @@ mod references;
 mod reflective;
 mod samplers;
 mod scene;
+mod slurm;
 mod sobol;
 mod stream;
 mod variance_law;

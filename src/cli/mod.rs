@@ -15,6 +15,7 @@ mod render;
 mod scene;
 mod shell;
 mod signals;
+mod submit;
 mod values;
 
 use std::io::Write as _;
@@ -33,6 +34,7 @@ Examples:
   gpu-trace glass --spp 1024 -o glass.exr      another scene, linear floats
   gpu-trace my.toml --error 1% --time 2m       until the error is 1 % or two minutes are over
   gpu-trace resume my.film                     go on with what --checkpoint my.film kept
+  gpu-trace submit slurm my.toml --tasks 8     render on eight machines of a cluster
   gpu-trace price my.toml                      what will 1 % cost, in seconds?
   gpu-trace effects my.toml                    what the kernel will hold, and why
   gpu-trace check --quick                      does this adapter stand the hard cases?
@@ -69,6 +71,9 @@ enum Command {
     Resume(Box<render::ResumeArgs>),
     /// Join the film files of parts (--sample-range) to one image.
     Merge(Box<render::MergeArgs>),
+    /// Render on many machines: write a job of many tasks and the merge after them, and submit both.
+    #[command(subcommand)]
+    Submit(SubmitCommand),
     /// List what the kernel of a scene holds, which object asked for it, and what is left out.
     Effects {
         #[command(flatten)]
@@ -104,6 +109,13 @@ enum Command {
     },
     /// Print the manual page.
     Man,
+}
+
+#[derive(Debug, Subcommand)]
+enum SubmitCommand {
+    /// By Slurm: an array of tasks, each a range of samples, and a dependent merge.
+    #[command(after_help = submit::AFTER_HELP)]
+    Slurm(Box<submit::SlurmArgs>),
 }
 
 #[derive(Debug, Subcommand)]
@@ -168,6 +180,7 @@ fn run(cli: Cli) -> Result<()> {
         Some(Command::Render(args)) => render::run(&args),
         Some(Command::Resume(args)) => render::resume(&args),
         Some(Command::Merge(args)) => render::merge(&args),
+        Some(Command::Submit(SubmitCommand::Slurm(args))) => submit::run(&args),
         Some(Command::Effects { render, json }) => effects::run(&render, json),
         Some(Command::Price(args)) => price::run(&args),
         Some(Command::Check(args)) => check::run(&args),

@@ -26,6 +26,6 @@ pub use record::{Counts, Record};
 pub use sums::Film;
 pub(crate) use sums::PIXEL_BYTES;
 pub use window::{
-    BLOCK, LEAST_SAMPLES, NonFinite, PixelSums, Tally, WINDOW, Window, half_of, next_look,
+    BLOCK, LEAST_SAMPLES, NonFinite, PixelSums, Tally, WINDOW, Window, cut, half_of, next_look,
     window_end,
 };

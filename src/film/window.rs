@@ -23,6 +23,37 @@ pub fn window_end(start: u64, end: u64) -> u64 {
     boundary.min(end)
 }
 
+/// A range of samples as at most `count` ranges of about one length, one after the other, that end where
+/// windows do: so the films of all of them add up to that of the whole. Fewer where windows are too few.
+#[must_use]
+pub fn cut(samples: Range<u64>, count: u32) -> Vec<Range<u64>> {
+    let Range { start, end } = samples;
+    let length = u128::from(end.saturating_sub(start));
+    let mut parts = Vec::new();
+    let mut from = start;
+    for part in 1..=u128::from(count) {
+        // Below `end`, for it is at most the length.
+        let aim = start + (length * part / u128::from(count)) as u64;
+        let (below, above) = (window_start(aim), window_end(aim, end));
+        let to = match aim {
+            aim if aim == end => end,
+            aim if aim - below <= above - aim => below,
+            _ => above,
+        };
+        if to > from {
+            parts.push(from..to);
+            from = to;
+        }
+    }
+    parts
+}
+
+/// Where the window begins that has the sample `at`.
+fn window_start(at: u64) -> u64 {
+    let boundary = [128, 64, 16].into_iter().find(|b| at >= *b).unwrap_or(0);
+    boundary.max(at / WINDOW * WINDOW)
+}
+
 /// Which of the two halves of the jackknife ([`Film::relative_variance`](super::Film::relative_variance)) a
 /// window belongs to that starts at `start`: every other of the windows that [`window_end`] ends, whichever of
 /// them are there, and in whatever order they come. A pilot's count like those from sample 0 on.
@@ -154,6 +185,48 @@ mod tests {
         // Companion: a render that begins elsewhere had others.
         let elsewhere = by_the_lesser_so_far(16);
         assert!(elsewhere.iter().any(|(lesser, ours)| lesser != ours));
+    }
+
+    #[test]
+    fn cuts_are_window_ends_and_about_even() {
+        let is_end = |at: u64, end| at == end || (0..at).any(|start| window_end(start, end) == at);
+        for (samples, count) in [
+            (0..4096, 8),
+            (0..1000, 3),
+            (0..1 << 20, 7),
+            (512..4096, 5),
+            (37..5000, 4),
+            (0..256, 3),
+            (0..256, 100),
+            (0..5, 2),
+            (300..400, 2),
+            (0..8000, 1),
+        ] {
+            let parts = cut(samples.clone(), count);
+            let shown = format!("{samples:?} in {count}: {parts:?}");
+            assert!(parts.len() <= count as usize, "{shown}");
+            assert_eq!(parts[0].start, samples.start, "{shown}");
+            assert_eq!(parts[parts.len() - 1].end, samples.end, "{shown}");
+            for pair in parts.windows(2) {
+                assert_eq!(pair[0].end, pair[1].start, "{shown}");
+            }
+            let even = (samples.end - samples.start).div_ceil(u64::from(count));
+            for part in &parts {
+                let end = part.end.min(samples.end);
+                assert!(end > 100_000 || is_end(end, samples.end), "{shown}");
+                assert!(
+                    end % WINDOW == 0 || end < WINDOW || end == samples.end,
+                    "{shown}"
+                );
+                // As near as windows let it.
+                assert!(part.end - part.start < even + WINDOW, "{shown}");
+            }
+        }
+        assert_eq!(cut(0..1024, 4), [0..256, 256..512, 512..768, 768..1024]);
+        assert_eq!(cut(0..256, 9), [0..16, 16..64, 64..128, 128..256]);
+        assert_eq!(cut(0..1 << 48, 2)[0], 0..1 << 47);
+        // Companion: cuts at even lengths are no window ends.
+        assert!(!is_end(1000 / 3, 1000));
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! Parts of an image become one: in the order of their sample indices, whatever order they come in.
 
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use super::{About, FilmFile, read, read_about};
@@ -41,7 +42,8 @@ impl Parts {
         check_same(&parts)?;
         let ranges = ranges(&parts)?;
         if !allow_gaps && let [[_, from], [to, _], ..] = ranges[..] {
-            return Err(Error::Usage(gap_text(&parts, from, to)));
+            let text = gap_text(&parts, from, to);
+            return Err(Error::Usage(format!("{text}; or --allow-gaps")));
         }
         Ok(Self { parts, ranges })
     }
@@ -51,6 +53,27 @@ impl Parts {
     pub fn first(&self) -> (&About, &Path) {
         let Part { path, about } = &self.parts[0];
         (about, path)
+    }
+
+    /// That the parts have just these samples.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] with those that are missing, or too many.
+    pub fn check_samples(&self, samples: &Range<u64>) -> Result<()> {
+        let (first, last) = (self.ranges[0][0], self.ranges[self.ranges.len() - 1][1]);
+        if first > samples.start {
+            return Err(Error::Usage(gap_text(&self.parts, samples.start, first)));
+        }
+        if last < samples.end {
+            return Err(Error::Usage(gap_text(&self.parts, last, samples.end)));
+        }
+        if (first..last) == *samples {
+            return Ok(());
+        }
+        Err(Error::Usage(format!(
+            "the parts have the samples {first}..{last}, more than {}..{}",
+            samples.start, samples.end
+        )))
     }
 
     /// The image of all, one part after the other. Their makers may differ, and are all kept; the rest that
@@ -178,5 +201,5 @@ fn gap_text(parts: &[Part], from: u64, to: u64) -> String {
         Some(name) => format!("{name} is not finished: gpu-trace resume {name}"),
         None => format!("render them with --sample-range {from}..{to}"),
     };
-    format!("no part has the samples {from}..{to}: {help}; or --allow-gaps")
+    format!("no part has the samples {from}..{to}: {help}")
 }

@@ -85,13 +85,11 @@ impl Pilot {
     /// if nothing is known of the variance.
     #[must_use]
     pub fn to_error(&self, limit: f64, most: u64) -> Option<Forecast> {
-        let bound = 1.0 + self.margin;
-        let least = |factor: f64| self.least_samples(limit, bound * factor, most);
-        let spp = self.look(least(1.0)?);
+        let spp = self.stop(limit, 0.0, most)?;
+        let low = self.stop(limit, -Z, most).unwrap_or(spp);
         // Beyond the cap the upper end is the cap's.
-        let spread = Z * self.variance_spread();
-        let low = self.look(least((-spread).exp()).unwrap_or(spp));
-        let high = self.look(least(spread.exp()).unwrap_or(most));
+        let high = self.sure_samples(limit, most);
+        let high = high.unwrap_or_else(|| self.look(most));
         Some(Forecast {
             error: self.error(spp),
             spp,
@@ -101,6 +99,13 @@ impl Pilot {
                 self.seconds(high) * (Z * self.path_seconds.spread).exp(),
             ],
         })
+    }
+
+    /// The samples a pixel that reach the error `limit` in 97.5 % of all renders, as far as the pilot can tell;
+    /// `None` as in [`to_error`](Self::to_error).
+    #[must_use]
+    pub fn sure_samples(&self, limit: f64, most: u64) -> Option<u64> {
+        self.stop(limit, Z, most)
     }
 
     /// The render of so many samples a pixel.
@@ -176,6 +181,13 @@ impl Pilot {
             }
         }
         Some(low)
+    }
+
+    /// The samples at which a render stops if the variance is so many standard errors above what was measured.
+    fn stop(&self, limit: f64, deviations: f64, most: u64) -> Option<u64> {
+        let factor = (deviations * self.variance_spread()).exp();
+        let least = self.least_samples(limit, (1.0 + self.margin) * factor, most)?;
+        Some(self.look(least))
     }
 
     /// The first look at the error at or after `spp` samples.
@@ -273,6 +285,13 @@ mod tests {
             assert!(low < forecast.seconds && forecast.seconds < high);
         }
         assert_eq!(pilot.to_error(0.01, 1000), None);
+        // With a variance that is known, one is as sure as the other.
+        let mut known = pilot.clone();
+        let of = |pilot: &Pilot| pilot.to_error(0.02, 1 << 20).map(|f| f.spp);
+        assert!(pilot.sure_samples(0.02, 1 << 20) > of(&pilot));
+        known.variance[2].spread = 0.0;
+        assert_eq!(known.sure_samples(0.02, 1 << 20), of(&known));
+        assert_eq!(pilot.sure_samples(0.01, 1000), None);
     }
 
     #[test]

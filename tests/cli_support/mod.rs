@@ -232,11 +232,18 @@ impl Background {
     }
 
     pub(crate) fn signal(&self, name: &str) {
+        self.signal_to(name, &self.child.id().to_string());
+    }
+
+    /// A signal to all processes of a run that was started as a process group.
+    #[cfg(unix)]
+    pub(crate) fn signal_group(&self, name: &str) {
+        self.signal_to(name, &format!("-{}", self.child.id()));
+    }
+
+    fn signal_to(&self, name: &str, whom: &str) {
         let mut kill = Command::new("kill");
-        let status = kill
-            .arg(format!("-{name}"))
-            .arg(self.child.id().to_string())
-            .status();
+        let status = kill.args(["-s", name, "--", whom]).status();
         assert!(status.is_ok_and(|status| status.success()), "kill -{name}");
     }
 

@@ -5,6 +5,8 @@ mod drivers;
 mod forecasts;
 mod lints;
 mod numerics;
+#[cfg(unix)]
+mod slurm;
 mod soak;
 mod suite;
 mod test;
@@ -20,6 +22,8 @@ Usage: cargo xtask TASK
   bench    run the benchmarks side by side and print their table (--help for its options)
   numerics run `gpu-trace check` on every driver that is there, into the table of docs/numerics.md
            (--help for its options)
+  slurm    start a Slurm on this machine, which has to be installed, and run the tests of
+           `submit slurm` on it
   soak     render for 30 minutes, or as many as are named, and fail if memory grows
 ";
 
@@ -31,6 +35,8 @@ fn main() -> ExitCode {
         Some("test") => test::all(&rest),
         Some("numerics") => numerics::all(&rest),
         Some("bench") => bench::all(&rest),
+        #[cfg(unix)]
+        Some("slurm") => slurm::all(&rest),
         Some("soak") => soak::all(&rest),
         Some("help" | "--help" | "-h") => {
             print!("{USAGE}");

@@ -1,5 +1,6 @@
 //! `gpu-trace merge`: the film files of parts become one image.
 
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -12,8 +13,10 @@ use super::summary::{no_stderr, not_finite, observations};
 use super::{Request, check_finite, finish};
 use crate::backend::{BackendKind, check_memory, joined_pixel_bytes};
 use crate::cli::args::RenderArgs;
+use crate::cli::format::percent;
 use crate::cli::values;
 use crate::error::{Error, Result};
+use crate::film::WINDOW;
 use crate::film_file::join::Parts;
 use crate::film_file::{self, About, FilmFile, Maker};
 use crate::job::prepare;
@@ -46,6 +49,12 @@ pub(crate) struct MergeArgs {
     /// Take parts between which samples are missing
     #[arg(long)]
     allow_gaps: bool,
+    /// The samples that the parts must have together, or they are refused
+    #[arg(long, value_name = "A..B", value_parser = values::range, conflicts_with = "allow_gaps")]
+    sample_range: Option<Range<u64>>,
+    /// Exit with 3 if the estimated error is above this: 1% or 0.01
+    #[arg(long, value_name = "P", value_parser = values::error, allow_hyphen_values = true)]
+    error: Option<f64>,
     /// Brighten the PNG by a factor of 2^EV
     #[arg(long, value_name = "EV", value_parser = values::exposure, default_value = "0",
           allow_hyphen_values = true, hide_default_value = true)]
@@ -64,6 +73,9 @@ pub(crate) fn run(args: &MergeArgs) -> Result<()> {
     let targets = args.output.iter().map(Target::parse);
     let targets: Vec<Target> = targets.collect::<Result<_>>()?;
     let parts = Parts::of(&args.parts, args.allow_gaps)?;
+    if let Some(range) = &args.sample_range {
+        parts.check_samples(range)?;
+    }
     let (about, path) = parts.first();
     let settings = about.settings.settings(&about.goal).map_err(Error::Usage)?;
     // What was to end a part is not what ends the whole.
@@ -144,7 +156,31 @@ pub(crate) fn run(args: &MergeArgs) -> Result<()> {
     };
     finish(&render, &request, &outcome, &stats)?;
     saved.transpose()?;
-    check_finite(&outcome, args.allow_non_finite)
+    check_finite(&outcome, args.allow_non_finite)?;
+    args.error.map_or(Ok(()), |limit| judge(&stats, limit))
+}
+
+/// Whether the error that was asked for is reached.
+fn judge(stats: &Stats, limit: f64) -> Result<()> {
+    let Some(error) = stats.estimated_error else {
+        return Err(Error::Check(format!(
+            "the error is unknown: that it is {} at most cannot be said",
+            percent(limit)
+        )));
+    };
+    if error <= limit {
+        return Ok(());
+    }
+    // It falls with the root of the samples.
+    let wanted = stats.spp as f64 * (error / limit).powi(2);
+    Err(Error::Check(format!(
+        "the error is {}, above {}: some {} samples a pixel should do; --sample-range {}..B renders those that \
+         are missing, and merge takes all parts",
+        percent(error),
+        percent(limit),
+        (wanted as u64).next_multiple_of(WINDOW),
+        stats.sample_range[1],
+    )))
 }
 
 fn check_outputs(args: &MergeArgs, targets: &[Target], inputs: &[&Path]) -> Result<()> {
