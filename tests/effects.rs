@@ -14,7 +14,9 @@ use gpu_trace::materials::{ALL, MaterialKind, forms};
 use gpu_trace::placement::Placement;
 use gpu_trace::placement::lights::MOST_WEIGHED;
 use gpu_trace::sampler::Sampler;
-use gpu_trace::scene::{Camera, Handedness, Material, RenderDefaults, Scene, Sphere};
+use gpu_trace::scene::{
+    Camera, Environment, Gradient, Handedness, Material, RenderDefaults, Scene, Sphere,
+};
 use gpu_trace::settings::{GeometryChoice, Integrator, LightSampling, Offset, Settings};
 use gpu_trace::shader::{Kernel, Stage, declared_names, link};
 use gpu_trace::verify::Random;
@@ -115,6 +117,21 @@ fn of_form(code: u32) -> MaterialKind {
     fitting.next().expect("a case of every form")
 }
 
+/// The environment that asks for the effects of `set`.
+fn environment_of(set: &Set) -> Option<Environment> {
+    let radiance = DVec3::new(0.5, 0.6, 0.7);
+    let has = |effect| set.contains(&effect);
+    match [Effect::Environment, Effect::Gradient].map(has) {
+        [true, _] => Some(Environment::Constant(radiance)),
+        [_, true] => Some(Environment::Gradient(Gradient {
+            zenith: radiance,
+            horizon: 2.0 * radiance,
+            ground: 0.5 * radiance,
+        })),
+        _ => None,
+    }
+}
+
 /// A scene and settings that ask for exactly the effects of `set`, where that is possible.
 fn asking_for(set: &Set) -> (Scene, Settings) {
     let has = |effect| set.contains(&effect);
@@ -187,7 +204,7 @@ fn asking_for(set: &Set) -> (Scene, Settings) {
         width: 16,
         height: 16,
         render: RenderDefaults::default(),
-        environment: has(Effect::Environment).then_some(DVec3::new(0.5, 0.6, 0.7)),
+        environment: environment_of(set),
         materials: kinds.iter().enumerate().map(material).collect(),
         spheres,
     };

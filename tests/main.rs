@@ -48,6 +48,7 @@ mod references;
 mod reflective;
 mod samplers;
 mod scene;
+mod sky;
 mod sobol;
 mod stream;
 mod variance_law;

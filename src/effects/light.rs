@@ -3,6 +3,7 @@
 use super::surfaces::forms_that;
 use super::{Asked, Effect, Row, when};
 use crate::placement::lights::MOST_WEIGHED;
+use crate::scene::Environment;
 use crate::settings::{Integrator, LightSampling};
 
 pub(super) fn rows() -> Vec<Row> {
@@ -19,8 +20,8 @@ pub(super) fn rows() -> Vec<Row> {
             Effect::Environment,
             "environment",
             "constant light from everywhere",
-            |asked| match asked.scene.environment {
-                Some(e) if e.max_element() > 0.0 && !asked.placement.enclosed => {
+            |asked| match environment(asked) {
+                Some(Environment::Constant(e)) => {
                     vec![format!(
                         "environment: radiance = [{}, {}, {}]",
                         e.x, e.y, e.z
@@ -29,7 +30,23 @@ pub(super) fn rows() -> Vec<Row> {
                 _ => vec![],
             },
         )
+        .excludes([Effect::Gradient])
         .marks(["light::environment", "ENVIRONMENT"]),
+        Row::new(
+            Effect::Gradient,
+            "gradient",
+            "light from everywhere, of three colours by height",
+            |asked| {
+                let gradient = matches!(environment(asked), Some(Environment::Gradient(_)));
+                when(gradient, || "environment: gradient".into())
+            },
+        )
+        .marks([
+            "light::gradient",
+            "GRADIENT_ZENITH",
+            "GRADIENT_HORIZON",
+            "GRADIENT_GROUND",
+        ]),
         Row::new(
             Effect::Lights,
             "lights",
@@ -110,6 +127,12 @@ pub(super) fn rows() -> Vec<Row> {
         .needs([Effect::Lights])
         .marks(["mis_weight"]),
     ]
+}
+
+/// The environment, if a path can see it.
+fn environment<'a>(asked: &Asked<'a>) -> Option<&'a Environment> {
+    let environment = asked.scene.environment.as_ref();
+    environment.filter(|e| e.brightest() > 0.0 && !asked.placement.enclosed)
 }
 
 /// Whether vertices look for lights.

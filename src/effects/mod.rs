@@ -64,6 +64,8 @@ pub enum Effect {
     Emission,
     /// A constant environment.
     Environment,
+    /// An environment of three colours by height.
+    Gradient,
     /// The lecture's estimator.
     Lecture,
     /// Light sampling.

@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::core::random::{random4, sample_key};
 use super::core::sobol::sobol4;
 use super::light::aim::aim_at;
-use super::light::environment_radiance;
+use super::light::environment::environment_radiance;
 use super::light::sphere::{light_pdf, mis_weight, sample_light};
 use super::purpose::{CAMERA, lighting, scattering};
 use super::scene::camera::camera_ray;
@@ -123,7 +123,7 @@ impl PathTracer<'_> {
     fn extend(&self, path: &mut Path, random: &dyn Fn(u32) -> [f64; 4]) -> bool {
         path.found.rays += 1;
         let Some(hit) = closest_hit(&path.ray, &self.placement.spheres) else {
-            let sky = environment_radiance(self.scene);
+            let sky = environment_radiance(self.scene, path.ray.direction);
             path.receive(path.class, path.throughput * sky);
             return false;
         };

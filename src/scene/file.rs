@@ -44,10 +44,10 @@ pub(super) struct SceneFile {
     #[serde(default)]
     #[schemars(with = "RenderTable")]
     pub(super) render: RenderTable,
-    /// The constant environment; black without this table.
+    /// What a path sees that hits nothing; black without this table.
     #[schemars(with = "EnvironmentTable")]
     #[serde(default)]
-    pub(super) environment: Option<EnvironmentTable>,
+    pub(super) environment: Option<Spanned<EnvironmentTable>>,
     /// The materials, by name.
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, MaterialTable>")]
@@ -126,13 +126,34 @@ pub(super) struct RenderTable {
     pub(super) max_bounces: Option<u32>,
 }
 
-/// A constant environment.
+/// What a path sees that hits nothing: one of `radiance` and `gradient`.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(extend("anyOf" = [{ "required": ["radiance"] }, { "required": ["gradient"] }]))]
 pub(super) struct EnvironmentTable {
     /// Radiance from every direction.
+    #[serde(default)]
     #[schemars(schema_with = "radiance")]
-    pub(super) radiance: [f64; 3],
+    pub(super) radiance: Option<Spanned<[f64; 3]>>,
+    /// Radiance by height.
+    #[serde(default)]
+    #[schemars(with = "GradientTable")]
+    pub(super) gradient: Option<Spanned<GradientTable>>,
+}
+
+/// Radiance by height: mix(horizon, zenith, w.y) above for the direction w, `ground` below.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct GradientTable {
+    /// Radiance from straight above, +y.
+    #[schemars(schema_with = "radiance")]
+    pub(super) zenith: [f64; 3],
+    /// Radiance from the horizon.
+    #[schemars(schema_with = "radiance")]
+    pub(super) horizon: [f64; 3],
+    /// Radiance from everywhere below the horizon.
+    #[schemars(schema_with = "radiance")]
+    pub(super) ground: [f64; 3],
 }
 
 /// A material: `type` decides which other keys it has. Any material may emit.

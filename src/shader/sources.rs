@@ -20,6 +20,7 @@ sources![
     "light/aim",
     "light/direct",
     "light/environment",
+    "light/gradient",
     "light/light",
     "light/mis",
     "light/nee",
