@@ -10,12 +10,13 @@ use std::sync::{Arc, Mutex};
 use crate::common::{scene_file, scene_files};
 use glam::DVec3;
 use gpu_trace::effects::{Effect, Effects, table};
+use gpu_trace::image::Picture;
 use gpu_trace::materials::{ALL, MaterialKind, forms};
 use gpu_trace::placement::Placement;
 use gpu_trace::placement::lights::MOST_WEIGHED;
 use gpu_trace::sampler::Sampler;
 use gpu_trace::scene::{
-    Camera, Environment, Gradient, Handedness, Material, RenderDefaults, Scene, Sphere,
+    Camera, Environment, Gradient, Handedness, Material, RenderDefaults, Scene, Sky, Sphere,
 };
 use gpu_trace::settings::{GeometryChoice, Integrator, LightSampling, Offset, Settings};
 use gpu_trace::shader::{Kernel, Stage, declared_names, link};
@@ -121,13 +122,17 @@ fn of_form(code: u32) -> MaterialKind {
 fn environment_of(set: &Set) -> Option<Environment> {
     let radiance = DVec3::new(0.5, 0.6, 0.7);
     let has = |effect| set.contains(&effect);
-    match [Effect::Environment, Effect::Gradient].map(has) {
-        [true, _] => Some(Environment::Constant(radiance)),
-        [_, true] => Some(Environment::Gradient(Gradient {
+    match [Effect::Environment, Effect::Gradient, Effect::Sky].map(has) {
+        [true, ..] => Some(Environment::Constant(radiance)),
+        [_, true, _] => Some(Environment::Gradient(Gradient {
             zenith: radiance,
             horizon: 2.0 * radiance,
             ground: 0.5 * radiance,
         })),
+        [.., true] => {
+            let image = Picture::new(2, 1, vec![[0.5, 0.6, 0.7], [0.0; 3]]);
+            Some(Environment::Sky(Sky::new("sky", image, DVec3::ONE, 0.0)))
+        }
         _ => None,
     }
 }

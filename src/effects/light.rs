@@ -30,7 +30,7 @@ pub(super) fn rows() -> Vec<Row> {
                 _ => vec![],
             },
         )
-        .excludes([Effect::Gradient])
+        .excludes([Effect::Gradient, Effect::Sky])
         .marks(["light::environment", "ENVIRONMENT"]),
         Row::new(
             Effect::Gradient,
@@ -41,11 +41,31 @@ pub(super) fn rows() -> Vec<Row> {
                 when(gradient, || "environment: gradient".into())
             },
         )
+        .excludes([Effect::Sky])
         .marks([
             "light::gradient",
             "GRADIENT_ZENITH",
             "GRADIENT_HORIZON",
             "GRADIENT_GROUND",
+        ]),
+        Row::new(
+            Effect::Sky,
+            "sky",
+            "light from everywhere, by an image in a texture",
+            |asked| {
+                let sky = environment(asked).and_then(Environment::sky);
+                sky.map_or(vec![], |sky| {
+                    vec![format!("environment: image = {:?}", sky.name())]
+                })
+            },
+        )
+        .marks([
+            "light::sky",
+            "core::turn",
+            "SKY_WIDTH",
+            "SKY_HEIGHT",
+            "SKY_TURN",
+            "receive_sky",
         ]),
         Row::new(
             Effect::Lights,

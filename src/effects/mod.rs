@@ -66,6 +66,8 @@ pub enum Effect {
     Environment,
     /// An environment of three colours by height.
     Gradient,
+    /// An image around all.
+    Sky,
     /// The lecture's estimator.
     Lecture,
     /// Light sampling.

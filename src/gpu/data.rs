@@ -1,5 +1,5 @@
 //! What the kernel reads of a scene, as it lies in its buffer: `SceneData` of `shaders/scene/data.wesl`; and the
-//! tree's texture.
+//! textures of the tree and the sky.
 
 use bytemuck::Pod;
 
@@ -11,13 +11,15 @@ use crate::gpu::layout::{LightRecord, MaterialRecord, PoleRecord, SphereRecord, 
 use crate::materials::Member;
 use crate::placement::Placement;
 use crate::placement::containment::MOST_CORES;
-use crate::scene::Scene;
+use crate::image::Picture;
+use crate::scene::{Environment, Scene, Sky};
 use crate::shader::{Kernel, material_members};
 
 /// Name of the buffer.
 pub(super) const SCENE: &str = "scene";
-/// Name of the texture.
+/// Names of the textures.
 pub(super) const TREE: &str = "tree";
+pub(super) const SKY: &str = "sky";
 
 /// Whether the device takes the scene's data, and `partials` bytes of partial sums.
 ///
@@ -55,11 +57,32 @@ pub(super) fn check_tree(limits: &wgpu::Limits, placement: &Placement) -> Result
     Ok(())
 }
 
+/// Whether the device takes the image around the scene.
+///
+/// # Errors
+/// [`Error::DeviceLimit`] if it is too wide or too high.
+pub(super) fn check_sky(limits: &wgpu::Limits, sky: &Sky) -> Result<()> {
+    let ([width, height], most) = (
+        [sky.image().width, sky.image().height],
+        limits.max_texture_dimension_2d,
+    );
+    if width.max(height) > most {
+        return Err(Error::DeviceLimit(format!(
+            "the environment's image {} has {width} x {height} texels, more than the device's limit of {most} \
+             a side; --backend cpu has no such limit",
+            sky.name()
+        )));
+    }
+    Ok(())
+}
+
 /// What the device holds of a scene.
 #[derive(Debug)]
 pub(super) struct SceneBytes {
     data: Option<Vec<u8>>,
     tree: Option<Vec<u8>>,
+    /// With its width.
+    sky: Option<(Vec<u8>, u32)>,
 }
 
 impl SceneBytes {
@@ -77,6 +100,7 @@ impl SceneBytes {
         Self {
             data: scene_data(kernel, scene, placement, effects),
             tree: texels(effects),
+            sky: sky_of(scene, effects).map(|sky| sky_texels(sky, placement.radiance_scale)),
         }
     }
 
@@ -88,7 +112,26 @@ impl SceneBytes {
         if let Some(tree) = self.tree.as_ref().filter(|_| pass.binds(TREE)) {
             recording.upload_texels(TREE, tree, WIDTH);
         }
+        if let Some((sky, width)) = self.sky.as_ref().filter(|_| pass.binds(SKY)) {
+            recording.upload_texels(SKY, sky, *width);
+        }
     }
+}
+
+/// The image that a kernel with these effects looks up.
+pub(super) fn sky_of<'a>(scene: &'a Scene, effects: &Effects) -> Option<&'a Sky> {
+    let environment = scene.environment.as_ref();
+    environment
+        .and_then(Environment::sky)
+        .filter(|_| effects.has(Effect::Sky))
+}
+
+/// `sky` of `shaders/light/sky.wesl`, with its width.
+fn sky_texels(sky: &Sky, unit: f64) -> (Vec<u8>, u32) {
+    let Picture { width, height, .. } = *sky.image();
+    let places = (0..height).flat_map(|row| (0..width).map(move |column| (column, row)));
+    let texel = |(column, row)| (sky.texel(column, row) * unit).as_vec3().extend(0.0);
+    (bytes_of(places.map(|place| texel(place).to_array())), width)
 }
 
 /// The bytes that `kernel` reads; `None` if it reads nothing of the scene.

@@ -7,6 +7,7 @@ use glam::DVec3;
 
 use super::load::Loaded;
 use super::{Environment, Gradient, Handedness, Scene};
+use crate::numbers::significant;
 
 /// So many lights are listed one by one.
 const LIGHTS_LISTED: usize = 8;
@@ -130,8 +131,25 @@ fn in_words(environment: &Environment) -> String {
             horizon,
             ground,
         }) => {
-            let [zenith, horizon, ground] = [zenith, horizon, ground].map(|radiance| triple(*radiance));
-            format!("with radiance {zenith} at the zenith, {horizon} at the horizon, {ground} below")
+            let [zenith, horizon, ground] =
+                [zenith, horizon, ground].map(|radiance| triple(*radiance));
+            format!(
+                "with radiance {zenith} at the zenith, {horizon} at the horizon, {ground} below"
+            )
+        }
+        Environment::Sky(sky) => {
+            let (image, name) = (sky.image(), sky.name().escape_debug());
+            let mut text = format!("{name}, {} x {} texels", image.width, image.height);
+            if sky.scale() != DVec3::ONE {
+                text += &format!(", times {}", triple(sky.scale()));
+            }
+            if sky.rotation() != 0.0 {
+                text += &format!(", turned by {} degrees", sky.rotation());
+            }
+            format!(
+                "{text}, with radiance up to {}",
+                significant(environment.brightest())
+            )
         }
     }
 }

@@ -126,10 +126,12 @@ pub(super) struct RenderTable {
     pub(super) max_bounces: Option<u32>,
 }
 
-/// What a path sees that hits nothing: one of `radiance` and `gradient`.
+/// What a path sees that hits nothing: one of `radiance`, `gradient` and `image`.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(extend("anyOf" = [{ "required": ["radiance"] }, { "required": ["gradient"] }]))]
+#[schemars(extend("anyOf" = [
+    { "required": ["radiance"] }, { "required": ["gradient"] }, { "required": ["image"] },
+]))]
 pub(super) struct EnvironmentTable {
     /// Radiance from every direction.
     #[serde(default)]
@@ -139,6 +141,34 @@ pub(super) struct EnvironmentTable {
     #[serde(default)]
     #[schemars(with = "GradientTable")]
     pub(super) gradient: Option<Spanned<GradientTable>>,
+    /// An EXR, PNG or JPEG file of radiances, all around the axis +y; relative to the scene file's folder.
+    #[serde(default)]
+    #[schemars(with = "String")]
+    pub(super) image: Option<Spanned<String>>,
+    /// What the image's values are multiplied by: a number, or one for each channel.
+    #[serde(default)]
+    #[schemars(schema_with = "scale")]
+    pub(super) scale: Option<Spanned<ScaleValue>>,
+    /// By how much the image is turned about +y, from +x towards +z, in degrees.
+    #[serde(default)]
+    #[schemars(
+        with = "f64",
+        range(min = -MAX_MAGNITUDE, max = MAX_MAGNITUDE),
+        extend("default" = 0.0)
+    )]
+    pub(super) rotation: Option<Spanned<f64>>,
+    /// Whether the values of PNG and JPEG files are linear; without this key they are sRGB. EXR files are linear.
+    #[serde(default)]
+    #[schemars(with = "bool", extend("default" = false))]
+    pub(super) linear: Option<Spanned<bool>>,
+}
+
+/// A number or one for each channel.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(untagged)]
+pub(super) enum ScaleValue {
+    Number(f64),
+    Channels([f64; 3]),
 }
 
 /// Radiance by height: mix(horizon, zenith, w.y) above for the direction w, `ground` below.
@@ -285,6 +315,18 @@ pub(super) enum RadiusValue {
 
 fn radius(_: &mut SchemaGenerator) -> Schema {
     json_schema!({ "type": ["number", "string"], "exclusiveMinimum": 0.0, "maximum": MAX_MAGNITUDE })
+}
+
+fn scale(_: &mut SchemaGenerator) -> Schema {
+    json_schema!({
+        "type": ["number", "array"],
+        "minimum": 0.0,
+        "maximum": MAX_MAGNITUDE,
+        "items": { "type": "number", "minimum": 0.0, "maximum": MAX_MAGNITUDE },
+        "minItems": 3,
+        "maxItems": 3,
+        "default": 1.0,
+    })
 }
 
 fn words<'w>(words: impl Iterator<Item = &'w str>, default: Option<&str>) -> Schema {

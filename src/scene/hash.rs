@@ -9,6 +9,7 @@ use fnv::FnvHasher;
 use glam::DVec3;
 
 use super::{Environment, Gradient, Handedness, Scene};
+use crate::image::Picture;
 use crate::materials::{MaterialKind, Value};
 
 /// Hash of everything in the scene that the image depends on: 16 hexadecimal digits.
@@ -101,8 +102,24 @@ impl Fnv {
                 ground,
             })) => {
                 self.bytes(b"gradient");
-                [zenith, horizon, ground].map(|radiance| self.vector(*radiance));
+                for radiance in [zenith, horizon, ground] {
+                    self.vector(*radiance);
+                }
             }
+            Some(Environment::Sky(sky)) => {
+                self.bytes(b"image");
+                self.vector(sky.scale());
+                self.number(sky.rotation());
+                self.image(sky.image());
+            }
+        }
+    }
+
+    fn image(&mut self, image: &Picture) {
+        self.bytes(&image.width.to_le_bytes());
+        self.bytes(&image.height.to_le_bytes());
+        for value in image.pixels.as_flattened() {
+            self.bytes(&value.to_bits().to_le_bytes());
         }
     }
 

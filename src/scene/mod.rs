@@ -9,6 +9,7 @@ mod describe;
 pub mod environment;
 mod file;
 mod hash;
+mod image;
 pub mod load;
 pub mod particles;
 #[cfg(test)]
@@ -20,7 +21,7 @@ mod suggest;
 mod validate;
 
 pub use describe::summary;
-pub use environment::{Environment, Gradient};
+pub use environment::{Environment, Gradient, Sky};
 pub use file::{MAX_BOUNCES, MAX_SIDE, MAX_SPP, json_schema};
 pub use hash::{content_hash, file_hash};
 pub use load::Loaded;

@@ -47,6 +47,7 @@ fn to_toml(scene: &Scene) -> String {
         Some(Environment::Constant(radiance)) => {
             add(format!("[environment]\nradiance = {}", vector(*radiance)));
         }
+        Some(Environment::Sky(_)) => unreachable!("random scenes have no files"),
         Some(Environment::Gradient(gradient)) => add(format!(
             "[environment.gradient]\nzenith = {}\nhorizon = {}\nground = {}",
             vector(gradient.zenith),

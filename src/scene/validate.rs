@@ -163,7 +163,8 @@ pub(super) fn scene(
     }
 
     let environment = file.environment.as_ref();
-    let environment = environment.and_then(|table| environment::environment(table, report));
+    let environment =
+        environment.and_then(|table| environment::of_table(table, folder, &mut files, report));
     let scene = Scene {
         camera: camera?,
         width: file.image.width,

@@ -263,6 +263,16 @@ fn environment(scene: &Scene, placement: &Placement, effects: &Effects) -> Strin
             text += &format!("const GRADIENT_{name}: vec3f = {};\n", scaled(radiance));
         }
     }
+    if effects.has(Effect::Sky)
+        && let Some(sky) = environment.and_then(Environment::sky)
+    {
+        text += &format!(
+            "const SKY_WIDTH: u32 = {}u;\nconst SKY_HEIGHT: u32 = {}u;\nconst SKY_TURN: f32 = {};\n",
+            sky.image().width,
+            sky.image().height,
+            baked::number(sky.rotation() / 360.0)
+        );
+    }
     text
 }
 

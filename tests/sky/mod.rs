@@ -1,17 +1,20 @@
 //! Environments that are not the same everywhere: lookups against their f64 twins, and images against
 //! quadrature.
 
+mod files;
 mod gradient;
+mod image;
 
 use std::f64::consts::TAU;
 
 use glam::DVec3;
 use gpu_trace::film::Film;
+use gpu_trace::image::Picture;
 use gpu_trace::reference::core::sampling::basis_around;
-use gpu_trace::scene::Scene;
+use gpu_trace::scene::{Environment, Scene, Sky};
 use gpu_trace::settings::{Integrator, Settings};
 use gpu_trace::statistics::mean_and_error;
-use gpu_trace::verify::settings;
+use gpu_trace::verify::{Random, settings};
 
 use crate::common::{render_gpu, scene};
 
@@ -82,10 +85,16 @@ fn shows_the_integral(
             let error = error.hypot(2.0e-4 * truth);
             let z = |truth: f64| (mean - truth) / error;
             eprintln!("{n}, {}: {mean} +- {error} for {truth}", integrator.name());
-            assert!(z(truth).abs() < 3.9, "{n}, {integrator:?}: {mean} +- {error} for {truth}");
+            assert!(
+                z(truth).abs() < 3.9,
+                "{n}, {integrator:?}: {mean} +- {error} for {truth}"
+            );
             // Companion.
             let off = z((1.0 + power) * truth);
-            assert!(off.abs() > 3.9, "{n}, {integrator:?}: {power} is not found, {off}");
+            assert!(
+                off.abs() > 3.9,
+                "{n}, {integrator:?}: {power} is not found, {off}"
+            );
         }
     }
 }
@@ -93,9 +102,16 @@ fn shows_the_integral(
 /// Directions all around, with the axes and what is close to them among them, in f32 and of unit length to
 /// rounding.
 fn directions(count: usize, name: &str) -> Vec<[f32; 4]> {
-    let mut random = gpu_trace::verify::Random::new(name);
-    let near = |random: &mut gpu_trace::verify::Random| {
-        let axes = [DVec3::X, DVec3::Y, DVec3::Z, -DVec3::X, -DVec3::Y, -DVec3::Z];
+    let mut random = Random::new(name);
+    let near = |random: &mut Random| {
+        let axes = [
+            DVec3::X,
+            DVec3::Y,
+            DVec3::Z,
+            -DVec3::X,
+            -DVec3::Y,
+            -DVec3::Z,
+        ];
         let axis = axes[random.words()[0] as usize % 6];
         (axis + random.magnitude(-9.0, -1.0) * random.direction()).normalize()
     };
@@ -112,3 +128,24 @@ fn directions(count: usize, name: &str) -> Vec<[f32; 4]> {
     rows.collect()
 }
 
+/// A scene with a camera of 40 degrees in the middle of an image; `more` are lines of the scene file.
+fn in_sky(sky: Sky, more: &str) -> Scene {
+    let text = format!(
+        "[camera]\nposition = [0, 0, 4]\nlook_at = [0, 0, 0]\nfov = 40.0\n[image]\nwidth = 16\n\
+         height = 16\n{more}"
+    );
+    let mut scene = scene(&text);
+    scene.environment = Some(Environment::Sky(sky));
+    scene
+}
+
+/// An image of values whose logarithms are uniform over some `orders` of magnitude about 1; of 0, uniform to 1.
+fn random_image(width: u32, height: u32, name: &str, orders: f64) -> Picture {
+    let mut random = Random::new(name);
+    let mut value = || match orders > 0.0 {
+        true => random.magnitude(-0.5 * orders, 0.5 * orders) as f32,
+        false => random.unit() as f32,
+    };
+    let texels = (0..width * height).map(|_| [value(), value(), value()]);
+    Picture::new(width, height, texels.collect())
+}
