@@ -219,7 +219,11 @@ fn asking_for(set: &Set) -> (Scene, Settings) {
             [_, true] => GeometryChoice::Bvh,
             _ => GeometryChoice::Baked,
         },
-        integrator: match [Effect::Lecture, Effect::Mis, Effect::Lights].map(has) {
+        integrator: match [
+            has(Effect::Lecture),
+            has(Effect::Mis),
+            has(Effect::Lights) || has(Effect::Skylight),
+        ] {
             [true, ..] => Integrator::Lecture { termination: 0.2 },
             [_, true, _] => Integrator::Path,
             [.., true] => Integrator::Nee,
@@ -317,6 +321,22 @@ fn of_media(name: &str) -> bool {
     parts.any(|part| part == "media" || own.contains(&part))
 }
 
+/// Whether a name belongs to what all light sampling brings, of lamps and of an image.
+fn of_light_sampling(name: &str) -> bool {
+    let own = [
+        "share_of_hit",
+        "share_of_light",
+        "receive_direct",
+        "departure",
+        "lamp_hit",
+        "lighting",
+        "is_delta",
+    ];
+    let mut parts = name.split("::");
+    let modules = ["light::direct::", "light::light::"];
+    parts.any(|part| own.contains(&part)) || modules.iter().any(|module| name.starts_with(module))
+}
+
 /// A name that is there and should not be, or the other way round.
 fn wrong_names(names: &BTreeSet<String>, effects: &Effects) -> Option<String> {
     let used: Set = effects.used().collect();
@@ -333,6 +353,10 @@ fn wrong_names(names: &BTreeSet<String>, effects: &Effects) -> Option<String> {
     let media = names.iter().find(|name| of_media(name));
     if media.is_some() != effects.transmits() {
         return Some(format!("transmits: {media:?}"));
+    }
+    let sampling = names.iter().find(|name| of_light_sampling(name));
+    if sampling.is_some() != effects.samples_light() {
+        return Some(format!("light sampling: {sampling:?}"));
     }
     for material in ALL {
         let module = format!("materials::{}::", material.module);
@@ -493,7 +517,8 @@ fn unmarked(all: &[(Set, Arc<Linked>)]) -> BTreeMap<&str, Set> {
         // Those of a material's module are its own; the dispatch is that of what is in use, and so are the
         // members of `Material`: see layout.rs.
         let of_material = name.starts_with("materials::") || name.starts_with("bsdf::");
-        !effects.is_empty() && !marked && !of_material && !of_media(name) && name.contains("::")
+        let shared = of_media(name) || of_light_sampling(name);
+        !effects.is_empty() && !marked && !of_material && !shared && name.contains("::")
     });
     with
 }

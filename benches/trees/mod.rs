@@ -7,9 +7,7 @@ use gpu_trace::bvh::Tree;
 use gpu_trace::materials::MaterialKind;
 use gpu_trace::materials::diffuse::Diffuse;
 use gpu_trace::placement::Placement;
-use gpu_trace::scene::{
-    Camera, Environment, Handedness, Material, RenderDefaults, Scene, Sphere,
-};
+use gpu_trace::scene::{Camera, Environment, Handedness, Material, RenderDefaults, Scene, Sphere};
 use gpu_trace::settings::{GeometryChoice, Rect, Settings};
 use gpu_trace::verify::Random;
 

@@ -85,18 +85,26 @@ pub(super) fn rows() -> Vec<Row> {
         .marks([
             "lights",
             "light::aim",
-            "light::light",
-            "light::direct",
-            "Path::departure",
             "data::Light",
-            "share_of_hit",
-            "share_of_light",
-            "receive_direct",
+            "light_aim",
+            "limb_distance",
+            "share_of_emission",
             "light_weight",
-            "lamp_hit",
-            "lighting",
             "LIGHT_COUNT",
-            "is_delta",
+        ]),
+        Row::new(
+            Effect::Skylight,
+            "skylight",
+            "light sampling: at every vertex a direction to the image around all",
+            |asked| when(samples_sky(asked), || "an image as environment".into()),
+        )
+        .needs([Effect::Sky])
+        .excludes([Effect::Lecture])
+        .marks([
+            "light::skylight",
+            "share_of_sky",
+            "radiance_of",
+            "SKY_TABLE_WIDTH",
         ]),
         Row::new(
             Effect::Projected,
@@ -138,13 +146,13 @@ pub(super) fn rows() -> Vec<Row> {
             "weights between light sampling and BSDF sampling",
             |asked| {
                 let integrator = asked.settings.integrator;
-                when(
-                    samples_lights(asked) && integrator == Integrator::Path,
-                    || format!("integrator {}", integrator.name()),
-                )
+                let looks = samples_lights(asked) || samples_sky(asked);
+                when(looks && integrator == Integrator::Path, || {
+                    format!("integrator {}", integrator.name())
+                })
             },
         )
-        .needs([Effect::Lights])
+        .needs([Effect::Lights, Effect::Skylight])
         .marks(["mis_weight"]),
     ]
 }
@@ -155,12 +163,20 @@ fn environment<'a>(asked: &Asked<'a>) -> Option<&'a Environment> {
     environment.filter(|e| e.brightest() > 0.0 && !asked.placement.enclosed)
 }
 
-/// Whether vertices look for lights.
+/// Whether vertices look for light.
+fn looks_for_light(asked: &Asked<'_>) -> bool {
+    matches!(
+        asked.settings.integrator,
+        Integrator::Path | Integrator::Nee
+    )
+}
+
+/// Whether they look for lamps.
 fn samples_lights(asked: &Asked<'_>) -> bool {
-    let lights = !asked.placement.lights.table.is_empty();
-    lights
-        && matches!(
-            asked.settings.integrator,
-            Integrator::Path | Integrator::Nee
-        )
+    looks_for_light(asked) && !asked.placement.lights.table.is_empty()
+}
+
+/// Whether they look for an image around all.
+fn samples_sky(asked: &Asked<'_>) -> bool {
+    looks_for_light(asked) && environment(asked).is_some_and(|e| e.sky().is_some())
 }

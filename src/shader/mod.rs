@@ -18,6 +18,7 @@ use wesl::{CompileOptions, ManglerKind, ModulePath, VirtualResolver, Wesl};
 use crate::bvh;
 use crate::effects::{Effect, Effects, Role};
 use crate::error::{Error, Result};
+use crate::gpu::layout::SKY_TABLE_WIDTH;
 use crate::materials;
 use crate::placement::{Medium, Placement};
 use crate::scene::{Environment, Scene};
@@ -272,6 +273,9 @@ fn environment(scene: &Scene, placement: &Placement, effects: &Effects) -> Strin
             sky.image().height,
             baked::number(sky.rotation() / 360.0)
         );
+    }
+    if effects.has(Effect::Skylight) {
+        text += &format!("const SKY_TABLE_WIDTH: u32 = {SKY_TABLE_WIDTH}u;\n");
     }
     text
 }

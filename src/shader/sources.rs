@@ -27,6 +27,7 @@ sources![
     "light/nee",
     "light/projected",
     "light/sky",
+    "light/skylight",
     "light/table",
     "light/weighed",
     "materials/contract",

@@ -4,6 +4,7 @@
 mod files;
 mod gradient;
 mod image;
+mod light;
 
 use std::f64::consts::TAU;
 

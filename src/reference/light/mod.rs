@@ -3,4 +3,5 @@
 pub mod aim;
 pub mod environment;
 pub mod projected;
+pub mod skylight;
 pub mod sphere;
