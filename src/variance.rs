@@ -4,7 +4,7 @@
 use crate::film::{Estimate, Film};
 use crate::materials::MaterialKind;
 use crate::placement::{PlacedSphere, Placement, Side};
-use crate::scene::Scene;
+use crate::scene::{Environment, Scene};
 use crate::settings::{Integrator, Settings};
 
 /// A bound on the share of the image's energy that the bounce limit removed, a fraction; 0 if it cut
@@ -29,7 +29,7 @@ pub fn energy_cut_at_most(scene: &Scene, film: &Film) -> Option<f64> {
         .fold(0.0, f64::max);
     let emitted = used()
         .map(|material| material.emission.max_element())
-        .chain(scene.environment.map(|e| e.max_element()))
+        .chain(scene.environment.as_ref().map(Environment::brightest))
         .fold(0.0, f64::max);
     let estimate = Estimate::of(film);
     // Paths of unequal weight have no such sum.

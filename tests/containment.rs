@@ -6,7 +6,7 @@ use crate::common::{render_cpu, render_gpu, scene};
 use gpu_trace::effects::{Effect, Effects};
 use gpu_trace::placement::{Placement, Side};
 use gpu_trace::sampler::Sampler;
-use gpu_trace::scene::Scene;
+use gpu_trace::scene::{Environment, Scene};
 use gpu_trace::settings::{GeometryChoice, Settings};
 use gpu_trace::verify::{Random, means, settings};
 
@@ -233,7 +233,7 @@ fn a_closed_room_has_no_sky() {
     assert!(effects([0.0, 0.0, 4.0]).0);
     // Nor does it count for the unit of light.
     let mut scene = spheres([0.0, 0.0, 0.5], &[([0.0; 3], 1.0, "lamp")]);
-    scene.environment = Some(glam::DVec3::splat(1.0e20));
+    scene.environment = Some(Environment::Constant(glam::DVec3::splat(1.0e20)));
     assert_eq!(
         Placement::new(&scene, 16, 16).radiance_scale,
         effects([0.0, 0.0, 0.5]).1

@@ -10,11 +10,14 @@ use std::sync::{Arc, Mutex};
 use crate::common::{scene_file, scene_files};
 use glam::DVec3;
 use gpu_trace::effects::{Effect, Effects, table};
+use gpu_trace::image::Picture;
 use gpu_trace::materials::{ALL, MaterialKind, forms};
 use gpu_trace::placement::Placement;
 use gpu_trace::placement::lights::MOST_WEIGHED;
 use gpu_trace::sampler::Sampler;
-use gpu_trace::scene::{Camera, Handedness, Material, RenderDefaults, Scene, Sphere};
+use gpu_trace::scene::{
+    Camera, Environment, Gradient, Handedness, Material, RenderDefaults, Scene, Sky, Sphere,
+};
 use gpu_trace::settings::{GeometryChoice, Integrator, LightSampling, Offset, Settings, View};
 use gpu_trace::shader::{Kernel, Stage, declared_names, link};
 use gpu_trace::verify::Random;
@@ -118,6 +121,25 @@ fn of_form(code: u32) -> MaterialKind {
     fitting.next().expect("a case of every form")
 }
 
+/// The environment that asks for the effects of `set`.
+fn environment_of(set: &Set) -> Option<Environment> {
+    let radiance = DVec3::new(0.5, 0.6, 0.7);
+    let has = |effect| set.contains(&effect);
+    match [Effect::Environment, Effect::Gradient, Effect::Sky].map(has) {
+        [true, ..] => Some(Environment::Constant(radiance)),
+        [_, true, _] => Some(Environment::Gradient(Gradient {
+            zenith: radiance,
+            horizon: 2.0 * radiance,
+            ground: 0.5 * radiance,
+        })),
+        [.., true] => {
+            let image = Picture::new(2, 1, vec![[0.5, 0.6, 0.7], [0.0; 3]]);
+            Some(Environment::Sky(Sky::new("sky", image, DVec3::ONE, 0.0)))
+        }
+        _ => None,
+    }
+}
+
 /// A scene and settings that ask for exactly the effects of `set`, where that is possible.
 fn asking_for(set: &Set) -> (Scene, Settings) {
     let has = |effect| set.contains(&effect);
@@ -190,7 +212,7 @@ fn asking_for(set: &Set) -> (Scene, Settings) {
         width: 16,
         height: 16,
         render: RenderDefaults::default(),
-        environment: has(Effect::Environment).then_some(DVec3::new(0.5, 0.6, 0.7)),
+        environment: environment_of(set),
         materials: kinds.iter().enumerate().map(material).collect(),
         spheres,
     };
@@ -200,7 +222,11 @@ fn asking_for(set: &Set) -> (Scene, Settings) {
             [_, true] => GeometryChoice::Bvh,
             _ => GeometryChoice::Baked,
         },
-        integrator: match [Effect::Lecture, Effect::Mis, Effect::Lights].map(has) {
+        integrator: match [
+            has(Effect::Lecture),
+            has(Effect::Mis),
+            has(Effect::Lights) || has(Effect::Skylight),
+        ] {
             [true, ..] => Integrator::Lecture { termination: 0.2 },
             [_, true, _] => Integrator::Path,
             [.., true] => Integrator::Nee,
@@ -299,6 +325,22 @@ fn of_media(name: &str) -> bool {
     parts.any(|part| part == "media" || own.contains(&part))
 }
 
+/// Whether a name belongs to what all light sampling brings, of lamps and of an image.
+fn of_light_sampling(name: &str) -> bool {
+    let own = [
+        "share_of_hit",
+        "share_of_light",
+        "receive_direct",
+        "departure",
+        "lamp_hit",
+        "lighting",
+        "is_delta",
+    ];
+    let mut parts = name.split("::");
+    let modules = ["light::direct::", "light::light::"];
+    parts.any(|part| own.contains(&part)) || modules.iter().any(|module| name.starts_with(module))
+}
+
 /// A name that is there and should not be, or the other way round.
 fn wrong_names(names: &BTreeSet<String>, effects: &Effects) -> Option<String> {
     let used: Set = effects.used().collect();
@@ -315,6 +357,10 @@ fn wrong_names(names: &BTreeSet<String>, effects: &Effects) -> Option<String> {
     let media = names.iter().find(|name| of_media(name));
     if media.is_some() != effects.transmits() {
         return Some(format!("transmits: {media:?}"));
+    }
+    let sampling = names.iter().find(|name| of_light_sampling(name));
+    if sampling.is_some() != effects.samples_light() {
+        return Some(format!("light sampling: {sampling:?}"));
     }
     for material in ALL {
         let module = format!("materials::{}::", material.module);
@@ -475,7 +521,8 @@ fn unmarked(all: &[(Set, Arc<Linked>)]) -> BTreeMap<&str, Set> {
         // Those of a material's module are its own; the dispatch is that of what is in use, and so are the
         // members of `Material`: see layout.rs.
         let of_material = name.starts_with("materials::") || name.starts_with("bsdf::");
-        !effects.is_empty() && !marked && !of_material && !of_media(name) && name.contains("::")
+        let shared = of_media(name) || of_light_sampling(name);
+        !effects.is_empty() && !marked && !of_material && !shared && name.contains("::")
     });
     with
 }

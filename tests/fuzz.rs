@@ -29,7 +29,7 @@ use gpu_trace::film_file::{
     self, About, Choices, Command, FORMAT, FilmFile, Goal, SceneRecord, encode,
 };
 use gpu_trace::image::Picture;
-use gpu_trace::input::{decode, read};
+use gpu_trace::input::{decode, read, texels};
 use gpu_trace::output::{Layer, Metadata, Target, exr, npy, png};
 use gpu_trace::particles::{self, Format, Mistake, Place};
 use gpu_trace::placement::media::MAX_LEVELS;
@@ -252,6 +252,12 @@ const TOKENS: &[&str] = &[
     "spp",
     "max_bounces",
     "radiance",
+    "gradient",
+    "zenith",
+    "scale",
+    "rotation",
+    "linear",
+    "true",
     "position",
     "look_at",
     "up",
@@ -935,6 +941,46 @@ fn no_bytes_upset_the_image_readers() {
             }
         }
     });
+    assert!(tried.accepted > 0 && tried.refused > 0, "{tried:?}");
+}
+
+/// Files that a scene may name as images.
+fn texel_files() -> Vec<Vec<u8>> {
+    let data: Vec<u8> = (0..3 * 17 * 9).map(|i| (i * 5) as u8).collect();
+    let jpeg = |color: image::ExtendedColorType, channels: usize| {
+        let mut bytes = Vec::new();
+        image::codecs::jpeg::JpegEncoder::new(&mut bytes)
+            .encode(&data[..channels * 17 * 9], 17, 9, color)
+            .expect("a JPEG file");
+        bytes
+    };
+    let mut files = images();
+    files.push(jpeg(image::ExtendedColorType::Rgb8, 3));
+    files.push(jpeg(image::ExtendedColorType::L8, 1));
+    files
+}
+
+#[test]
+fn no_bytes_upset_the_readers_of_texels() {
+    let seeds = texel_files();
+    let tried = fuzz(
+        "texels",
+        numbers(20_000),
+        &seeds,
+        |index, bytes| match texels(bytes, index % 2 == 0, 1 << 20) {
+            Ok(image) => {
+                let size = image.width as usize * image.height as usize;
+                assert_eq!(image.pixels.len(), size);
+                true
+            }
+            Err(error) => {
+                let text = error.to_string();
+                assert!(!text.is_empty() && text.len() < 2000, "{text}");
+                assert!(!text.contains(char::is_control), "{text:?}");
+                false
+            }
+        },
+    );
     assert!(tried.accepted > 0 && tried.refused > 0, "{tried:?}");
 }
 

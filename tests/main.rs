@@ -49,6 +49,7 @@ mod references;
 mod reflective;
 mod samplers;
 mod scene;
+mod sky;
 mod slurm;
 mod sobol;
 mod stream;

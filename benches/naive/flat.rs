@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use gpu_trace::materials::MaterialKind;
-use gpu_trace::scene::{Handedness, Scene};
+use gpu_trace::scene::{Environment, Handedness, Scene};
 
 /// How a surface scatters.
 #[derive(Clone, Copy, PartialEq, serde::Serialize)]
@@ -101,7 +101,11 @@ impl FlatScene {
             up: camera.up.to_array(),
             fov: camera.fov,
             mirrored,
-            environment: scene.environment.unwrap_or_default().to_array(),
+            environment: {
+                let environment = scene.environment.as_ref();
+                let radiance = environment.and_then(Environment::constant);
+                radiance.unwrap_or_default().to_array()
+            },
             spheres: spheres.collect(),
             film: [forward - half, across, down].map(|v| v.to_array()),
             lens: [right, up].map(|v| (camera.aperture_radius * v).to_array()),

@@ -7,7 +7,7 @@ use gpu_trace::bvh::Tree;
 use gpu_trace::materials::MaterialKind;
 use gpu_trace::materials::diffuse::Diffuse;
 use gpu_trace::placement::Placement;
-use gpu_trace::scene::{Camera, Handedness, Material, RenderDefaults, Scene, Sphere};
+use gpu_trace::scene::{Camera, Environment, Handedness, Material, RenderDefaults, Scene, Sphere};
 use gpu_trace::settings::{GeometryChoice, Rect, Settings};
 use gpu_trace::verify::Random;
 
@@ -85,7 +85,7 @@ pub(crate) fn crowd(count: usize) -> Scene {
         width: 320,
         height: 240,
         render: RenderDefaults::default(),
-        environment: Some(DVec3::ONE),
+        environment: Some(Environment::Constant(DVec3::ONE)),
         materials: vec![Material {
             name: "gray".into(),
             kind: MaterialKind::Diffuse(Diffuse {

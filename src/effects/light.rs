@@ -3,6 +3,7 @@
 use super::surfaces::forms_that;
 use super::{Asked, Effect, Row, when};
 use crate::placement::lights::MOST_WEIGHED;
+use crate::scene::Environment;
 use crate::settings::{Integrator, LightSampling};
 
 pub(super) fn rows() -> Vec<Row> {
@@ -19,8 +20,8 @@ pub(super) fn rows() -> Vec<Row> {
             Effect::Environment,
             "environment",
             "constant light from everywhere",
-            |asked| match asked.scene.environment {
-                Some(e) if e.max_element() > 0.0 && !asked.placement.enclosed => {
+            |asked| match environment(asked) {
+                Some(Environment::Constant(e)) => {
                     vec![format!(
                         "environment: radiance = [{}, {}, {}]",
                         e.x, e.y, e.z
@@ -29,7 +30,43 @@ pub(super) fn rows() -> Vec<Row> {
                 _ => vec![],
             },
         )
+        .excludes([Effect::Gradient, Effect::Sky])
         .marks(["light::environment", "ENVIRONMENT"]),
+        Row::new(
+            Effect::Gradient,
+            "gradient",
+            "light from everywhere, of three colours by height",
+            |asked| {
+                let gradient = matches!(environment(asked), Some(Environment::Gradient(_)));
+                when(gradient, || "environment: gradient".into())
+            },
+        )
+        .excludes([Effect::Sky])
+        .marks([
+            "light::gradient",
+            "GRADIENT_ZENITH",
+            "GRADIENT_HORIZON",
+            "GRADIENT_GROUND",
+        ]),
+        Row::new(
+            Effect::Sky,
+            "sky",
+            "light from everywhere, by an image in a texture",
+            |asked| {
+                let sky = environment(asked).and_then(Environment::sky);
+                sky.map_or(vec![], |sky| {
+                    vec![format!("environment: image = {:?}", sky.name())]
+                })
+            },
+        )
+        .marks([
+            "light::sky",
+            "core::turn",
+            "SKY_WIDTH",
+            "SKY_HEIGHT",
+            "SKY_TURN",
+            "receive_sky",
+        ]),
         Row::new(
             Effect::Lights,
             "lights",
@@ -48,18 +85,26 @@ pub(super) fn rows() -> Vec<Row> {
         .marks([
             "lights",
             "light::aim",
-            "light::light",
-            "light::direct",
-            "Path::departure",
             "data::Light",
-            "share_of_hit",
-            "share_of_light",
-            "receive_direct",
+            "light_aim",
+            "limb_distance",
+            "share_of_emission",
             "light_weight",
-            "lamp_hit",
-            "lighting",
             "LIGHT_COUNT",
-            "is_delta",
+        ]),
+        Row::new(
+            Effect::Skylight,
+            "skylight",
+            "light sampling: at every vertex a direction to the image around all",
+            |asked| when(samples_sky(asked), || "an image as environment".into()),
+        )
+        .needs([Effect::Sky])
+        .excludes([Effect::Lecture])
+        .marks([
+            "light::skylight",
+            "share_of_sky",
+            "radiance_of",
+            "SKY_TABLE_WIDTH",
         ]),
         Row::new(
             Effect::Projected,
@@ -101,23 +146,37 @@ pub(super) fn rows() -> Vec<Row> {
             "weights between light sampling and BSDF sampling",
             |asked| {
                 let integrator = asked.settings.integrator;
-                when(
-                    samples_lights(asked) && integrator == Integrator::Path,
-                    || format!("integrator {}", integrator.name()),
-                )
+                let looks = samples_lights(asked) || samples_sky(asked);
+                when(looks && integrator == Integrator::Path, || {
+                    format!("integrator {}", integrator.name())
+                })
             },
         )
-        .needs([Effect::Lights])
+        .needs([Effect::Lights, Effect::Skylight])
         .marks(["mis_weight"]),
     ]
 }
 
-/// Whether vertices look for lights.
+/// The environment, if a path can see it.
+fn environment<'a>(asked: &Asked<'a>) -> Option<&'a Environment> {
+    let environment = asked.scene.environment.as_ref();
+    environment.filter(|e| e.brightest() > 0.0 && !asked.placement.enclosed)
+}
+
+/// Whether vertices look for light.
+fn looks_for_light(asked: &Asked<'_>) -> bool {
+    matches!(
+        asked.settings.integrator,
+        Integrator::Path | Integrator::Nee
+    )
+}
+
+/// Whether they look for lamps.
 fn samples_lights(asked: &Asked<'_>) -> bool {
-    let lights = !asked.placement.lights.table.is_empty();
-    lights
-        && matches!(
-            asked.settings.integrator,
-            Integrator::Path | Integrator::Nee
-        )
+    looks_for_light(asked) && !asked.placement.lights.table.is_empty()
+}
+
+/// Whether they look for an image around all.
+fn samples_sky(asked: &Asked<'_>) -> bool {
+    looks_for_light(asked) && environment(asked).is_some_and(|e| e.sky().is_some())
 }

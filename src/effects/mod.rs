@@ -66,10 +66,16 @@ pub enum Effect {
     Emission,
     /// A constant environment.
     Environment,
+    /// An environment of three colours by height.
+    Gradient,
+    /// An image around all.
+    Sky,
     /// The lecture's estimator.
     Lecture,
-    /// Light sampling.
+    /// Light sampling of lamps.
     Lights,
+    /// Light sampling of an image around all.
+    Skylight,
     /// Light sampling by projected solid angle.
     Projected,
     /// Lights drawn from a table.
@@ -344,6 +350,12 @@ impl Effects {
         self.has(Effect::Lights) && !self.has(Effect::Table)
     }
 
+    /// Whether vertices look for lamps or for an image around all.
+    #[must_use]
+    pub fn samples_light(&self) -> bool {
+        self.has(Effect::Lights) || self.has(Effect::Skylight)
+    }
+
     /// Name and state of every flag that the kernel's sources may ask for: effects, and what follows from
     /// them.
     pub fn flags(&self) -> impl Iterator<Item = (&'static str, bool)> {
@@ -355,6 +367,7 @@ impl Effects {
             ("transmits", self.transmits()),
             ("relative", self.looks_at_index()),
             ("weighed", self.weighs_lights()),
+            ("sampled", self.samples_light()),
         ])
     }
 

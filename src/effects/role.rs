@@ -36,7 +36,7 @@ impl Effects {
             (true, false) => Some("light/weighed"),
             (true, true) => Some("light/table"),
         };
-        let share = match (has(Effect::Lights), has(Effect::Mis)) {
+        let share = match (self.samples_light(), has(Effect::Mis)) {
             (false, _) => None,
             (true, false) => Some("light/nee"),
             (true, true) => Some("light/mis"),

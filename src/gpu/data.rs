@@ -1,5 +1,5 @@
 //! What the kernel reads of a scene, as it lies in its buffer: `SceneData` of `shaders/scene/data.wesl`; and the
-//! tree's texture.
+//! textures of the tree and the sky.
 
 use bytemuck::Pod;
 
@@ -7,17 +7,22 @@ use crate::bvh::WIDTH;
 use crate::effects::{Effect, Effects};
 use crate::error::{Error, Result};
 use crate::gpu::engine::{Pass, Recording};
-use crate::gpu::layout::{LightRecord, MaterialRecord, PoleRecord, SphereRecord, light_weight};
+use crate::gpu::layout::{
+    LightRecord, MaterialRecord, PoleRecord, SKY_TABLE_WIDTH, SphereRecord, light_weight, sky_table,
+};
+use crate::image::Picture;
 use crate::materials::Member;
 use crate::placement::Placement;
 use crate::placement::containment::MOST_CORES;
-use crate::scene::Scene;
+use crate::scene::{Environment, Scene, Sky};
 use crate::shader::{Kernel, material_members};
 
 /// Name of the buffer.
 pub(super) const SCENE: &str = "scene";
-/// Name of the texture.
+/// Names of the textures.
 pub(super) const TREE: &str = "tree";
+pub(super) const SKY: &str = "sky";
+pub(super) const SKY_TABLE: &str = "sky_table";
 
 /// Whether the device takes the scene's data, and `partials` bytes of partial sums.
 ///
@@ -55,11 +60,32 @@ pub(super) fn check_tree(limits: &wgpu::Limits, placement: &Placement) -> Result
     Ok(())
 }
 
+/// Whether the device takes the image around the scene.
+///
+/// # Errors
+/// [`Error::DeviceLimit`] if it is too wide or too high.
+pub(super) fn check_sky(limits: &wgpu::Limits, sky: &Sky) -> Result<()> {
+    let Picture { width, height, .. } = *sky.image();
+    let most = limits.max_texture_dimension_2d;
+    let table = table_rows(width, height).max(SKY_TABLE_WIDTH.into());
+    if width.max(height) > most || table > most.into() {
+        return Err(Error::DeviceLimit(format!(
+            "the environment's image {} has {width} x {height} texels, more than the device's limit of {most} \
+             a side; --backend cpu has no such limit",
+            sky.name()
+        )));
+    }
+    Ok(())
+}
+
 /// What the device holds of a scene.
 #[derive(Debug)]
 pub(super) struct SceneBytes {
     data: Option<Vec<u8>>,
     tree: Option<Vec<u8>>,
+    /// With its width.
+    sky: Option<(Vec<u8>, u32)>,
+    sky_table: Option<Vec<u8>>,
 }
 
 impl SceneBytes {
@@ -77,6 +103,10 @@ impl SceneBytes {
         Self {
             data: scene_data(kernel, scene, placement, effects),
             tree: texels(effects),
+            sky: sky_of(scene, effects).map(|sky| sky_texels(sky, placement, effects)),
+            sky_table: sky_of(scene, effects)
+                .filter(|_| effects.has(Effect::Skylight))
+                .map(|sky| bytemuck::cast_slice(&sky_table(placement.sky_table(sky))).to_vec()),
         }
     }
 
@@ -88,7 +118,44 @@ impl SceneBytes {
         if let Some(tree) = self.tree.as_ref().filter(|_| pass.binds(TREE)) {
             recording.upload_texels(TREE, tree, WIDTH);
         }
+        if let Some((sky, width)) = self.sky.as_ref().filter(|_| pass.binds(SKY)) {
+            recording.upload_texels(SKY, sky, *width);
+        }
+        let table = self.sky_table.as_ref();
+        if let Some(table) = table.filter(|_| pass.binds(SKY_TABLE)) {
+            recording.upload_texels(SKY_TABLE, table, SKY_TABLE_WIDTH);
+        }
     }
+}
+
+/// The image that a kernel with these effects looks up.
+pub(super) fn sky_of<'a>(scene: &'a Scene, effects: &Effects) -> Option<&'a Sky> {
+    let environment = scene.environment.as_ref();
+    environment
+        .and_then(Environment::sky)
+        .filter(|_| effects.has(Effect::Sky))
+}
+
+/// `sky` of `shaders/light/sky.wesl`, with its width.
+fn sky_texels(sky: &Sky, placement: &Placement, effects: &Effects) -> (Vec<u8>, u32) {
+    let Picture { width, height, .. } = *sky.image();
+    let table = effects
+        .has(Effect::Skylight)
+        .then(|| placement.sky_table(sky));
+    let texel = |(column, row)| {
+        let radiance = sky.texel(column, row) * placement.radiance_scale;
+        let density = table.map_or(0.0, |table| table.density(column, row));
+        radiance.as_vec3().extend(density as f32).to_array()
+    };
+    let places = (0..height).flat_map(|row| (0..width).map(move |column| (column, row)));
+    (bytes_of(places.map(texel)), width)
+}
+
+/// Rows of the texture `sky_table`.
+fn table_rows(width: u32, height: u32) -> u64 {
+    let [width, height] = [width, height].map(u64::from);
+    let texels = height + (width * height).div_ceil(4);
+    texels.div_ceil(SKY_TABLE_WIDTH.into())
 }
 
 /// The bytes that `kernel` reads; `None` if it reads nothing of the scene.

@@ -10,7 +10,8 @@ use glam::DVec3;
 use crate::effects::{Effect, Effects};
 use crate::film::{TILE, Tiles};
 use crate::materials::{Member, MemberValue, forms};
-use crate::placement::{Light, PlacedCamera, PlacedSphere, Placement};
+use crate::placement::sky::{Band, Entry};
+use crate::placement::{Light, PlacedCamera, PlacedSphere, Placement, SkyTable};
 use crate::scene::Material;
 use crate::settings::Rect;
 
@@ -108,6 +109,40 @@ impl LightRecord {
             curvature: (1.0 / sphere.radius) as f32,
         }
     }
+}
+
+/// Columns of the texture `sky_table` of `shaders/light/skylight.wesl`.
+pub const SKY_TABLE_WIDTH: u32 = 4096;
+
+/// The texels of that texture, whole rows of them.
+#[must_use]
+pub fn sky_table(table: &SkyTable) -> Vec<[u32; 4]> {
+    let word = |entry: &Entry| u32::from(entry.threshold) | u32::from(entry.other) << 16;
+    let rows = table.rows().len() as u32;
+    let of_row = |(row, entry): (u32, &Entry)| {
+        let Band { near, step, .. } = Band::of(row, rows);
+        [
+            word(entry),
+            (near as f32).to_bits(),
+            (step as f32).to_bits(),
+            0,
+        ]
+    };
+    let of_texels = table.columns().chunks(4).map(|entries| {
+        let mut words = [0; 4];
+        for (to, entry) in words.iter_mut().zip(entries) {
+            *to = word(entry);
+        }
+        words
+    });
+    let mut texels: Vec<[u32; 4]> = (0..)
+        .zip(table.rows())
+        .map(of_row)
+        .chain(of_texels)
+        .collect();
+    let whole = texels.len().next_multiple_of(SKY_TABLE_WIDTH as usize);
+    texels.resize(whole, [0; 4]);
+    texels
 }
 
 /// `Camera` of `shaders/scene/camera.wesl`; see [`PlacedCamera`]. Without a lens the kernel's struct

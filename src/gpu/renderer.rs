@@ -75,6 +75,9 @@ impl GpuRenderer {
         if effects.has(Effect::Bvh) {
             data::check_tree(&gpu.limits, placement)?;
         }
+        if let Some(sky) = data::sky_of(scene, effects) {
+            data::check_sky(&gpu.limits, sky)?;
+        }
 
         let program = Program::new(&gpu, "path", kernel);
         let mut constants = vec![("MAX_BOUNCES", f64::from(settings.max_bounces))];

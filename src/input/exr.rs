@@ -20,8 +20,8 @@ use crate::image::{Format, Picture};
 
 type Source<'a> = Reader<Cursor<&'a [u8]>>;
 
-/// Reads the one colour image that the file holds, and the layer `stderr` beside it.
-pub(super) fn decode(bytes: &[u8]) -> io::Result<Input> {
+/// Reads the one colour image that the file holds, of at most `most` pixels, and the layer `stderr` beside it.
+pub(super) fn decode(bytes: &[u8], most: u64) -> io::Result<Input> {
     let reader = exr::block::read(Cursor::new(bytes), false).map_err(corrupt)?;
     let choice = choose(reader.headers())?;
     let header = reader.headers()[choice.part].clone();
@@ -35,6 +35,7 @@ pub(super) fn decode(bytes: &[u8]) -> io::Result<Input> {
         pixel_bytes.sum::<u64>().max(12),
         ratio(header.compression),
         bytes.len(),
+        most,
     )?;
     let mut wanted = choice.colour.to_vec();
     wanted.extend(choice.stderr.iter().flatten());

@@ -1,9 +1,11 @@
-//! Images of any origin: EXR, NPY and PNG, told apart by their first bytes, as linear RGB.
+//! Images of any origin: EXR, NPY and PNG, told apart by their first bytes, as linear RGB; and EXR, PNG and JPEG as
+//! what scenes look up.
 //!
 //! What a file cannot say, or says in a way that could be read as two things, is refused or noted;
 //! nothing is guessed in silence.
 
 mod exr;
+mod jpeg;
 mod npy;
 mod png;
 
@@ -108,8 +110,27 @@ fn read_all(mut file: File) -> io::Result<Vec<u8>> {
 pub fn decode(bytes: &[u8]) -> io::Result<Input> {
     match kind(bytes)? {
         Format::Png => png::decode(bytes),
-        Format::Exr => exr::decode(bytes),
+        Format::Exr => exr::decode(bytes, u64::MAX),
         Format::Npy => npy::decode(bytes),
+    }
+}
+
+/// The bytes of an EXR, PNG or JPEG file as texels, of which there may be `most`. EXR is linear; values of PNG and JPEG
+/// are sRGB, or `linear` as well, whatever the file says of it. Alpha is left out.
+///
+/// # Errors
+/// [`io::ErrorKind::InvalidData`] with what is wrong.
+pub fn texels(bytes: &[u8], linear: bool, most: u64) -> io::Result<Picture> {
+    if bytes.starts_with(Format::Exr.magic()) {
+        exr::decode(bytes, most).map(|input| input.picture)
+    } else if bytes.starts_with(Format::Png.magic()) {
+        png::texels(bytes, linear, most)
+    } else if bytes.starts_with(jpeg::MAGIC) {
+        jpeg::texels(bytes, linear, most)
+    } else {
+        Err(invalid(
+            "this is neither an EXR, nor a PNG, nor a JPEG file",
+        ))
     }
 }
 
@@ -124,14 +145,20 @@ fn kind(bytes: &[u8]) -> io::Result<Format> {
 const PIXEL_BYTES: u64 = 16 << 20;
 
 /// Refuses a size that `bytes` cannot hold, before memory is taken for it: `pixel_bytes` for each
-/// pixel, packed by a factor of `ratio` at most.
+/// pixel, packed by a factor of `ratio` at most; and one of more than `most_pixels`.
 fn check_size(
     width: u64,
     height: u64,
     pixel_bytes: u64,
     ratio: u64,
     bytes: usize,
+    most_pixels: u64,
 ) -> io::Result<()> {
+    if width.saturating_mul(height) > most_pixels {
+        return Err(invalid(format!(
+            "it has {width}x{height} pixels, more than {most_pixels}, the limit"
+        )));
+    }
     let most = PIXEL_BYTES.max((bytes as u64).saturating_mul(ratio));
     let wanted = width.saturating_mul(height).saturating_mul(pixel_bytes);
     if wanted <= most && u32::try_from(width).is_ok() && u32::try_from(height).is_ok() {

@@ -18,54 +18,113 @@ const CHUNK_BYTES: usize = 16 << 20;
 /// Reads the image (the first, if it is animated). Colours that are not opaque are multiplied by
 /// their alpha, as over black, which is noted.
 pub(super) fn decode(bytes: &[u8]) -> io::Result<Input> {
-    let mut decoder = Decoder::new_with_limits(Cursor::new(bytes), Limits { bytes: CHUNK_BYTES });
-    decoder.set_transformations(Transformations::EXPAND);
-    let header = decoder.read_header_info().map_err(corrupt)?;
-    // Expanded to at most four channels of 16 bits, and as much again for the filter's lines.
-    let (width, height) = (header.width, header.height);
-    check_size(width.into(), height.into(), 8, 8 * RATIO, bytes.len())?;
-    let mut reader = decoder.read_info().map_err(corrupt)?;
-    let size = reader
-        .output_buffer_size()
-        .ok_or_else(|| invalid("the image is too large for memory"))?;
-    let mut data = vec![0; size];
-    let frame = reader.next_frame(&mut data).map_err(corrupt)?;
-    // Reads to the end: texts may stand behind the pixels, and what is cut off shows here.
-    reader.finish().map_err(corrupt)?;
+    let raster = Raster::read(bytes, u64::MAX)?;
     let mut notes = Vec::new();
-    let encoding = encoding(reader.info(), &mut notes)?;
-    let (channels, alpha) = match frame.color_type {
-        ColorType::Grayscale => (1, false),
-        ColorType::GrayscaleAlpha => (2, true),
-        ColorType::Rgb => (3, false),
-        ColorType::Rgba => (4, true),
-        ColorType::Indexed => return Err(invalid("its palette is missing")),
-    };
-    let value = |index: usize| match frame.bit_depth {
-        BitDepth::Sixteen => {
-            f64::from(u16::from_be_bytes([data[2 * index], data[2 * index + 1]])) / 65535.0
-        }
-        _ => f64::from(data[index]) / 255.0,
-    };
-    let opacity = |pixel: usize| match alpha {
-        true => value(pixel * channels + channels - 1),
-        false => 1.0,
-    };
+    let encoding = encoding(&raster.info, &mut notes)?;
     let colour = |pixel: usize| {
-        let first = pixel * channels;
-        let at = |channel| if channels < 3 { first } else { first + channel };
-        let opacity = opacity(pixel);
-        [0, 1, 2].map(|channel| (encoding.decode(value(at(channel))) * opacity) as f32)
+        let opacity = raster.opacity(pixel);
+        let colour = raster.colour(pixel);
+        colour.map(|value| (encoding.decode(value) * opacity) as f32)
     };
-    let count = frame.width as usize * frame.height as usize;
-    if (0..count).any(|pixel| opacity(pixel) < 1.0) {
+    if (0..raster.count()).any(|pixel| raster.opacity(pixel) < 1.0) {
         notes.push("it is not opaque everywhere: taken as over black".into());
     }
-    let picture = Picture::new(frame.width, frame.height, (0..count).map(colour).collect());
-    let mut input = Input::new(Format::Png, encoding, picture);
-    input.about = about(reader.info());
+    let mut input = Input::new(Format::Png, encoding, raster.picture(colour));
+    input.about = about(&raster.info);
     input.notes = notes;
     Ok(input)
+}
+
+/// Reads the colours alone, of at most `most` pixels: as sRGB, or `linear` ones.
+pub(super) fn texels(bytes: &[u8], linear: bool, most: u64) -> io::Result<Picture> {
+    let raster = Raster::read(bytes, most)?;
+    let encoding = match linear {
+        true => Encoding::Linear,
+        false => Encoding::Srgb,
+    };
+    let colour = |pixel: usize| {
+        raster
+            .colour(pixel)
+            .map(|value| encoding.decode(value) as f32)
+    };
+    Ok(raster.picture(colour))
+}
+
+/// The pixels of a file, as it holds them.
+struct Raster {
+    width: u32,
+    height: u32,
+    channels: usize,
+    alpha: bool,
+    wide: bool,
+    data: Vec<u8>,
+    info: Info<'static>,
+}
+
+impl Raster {
+    fn read(bytes: &[u8], most: u64) -> io::Result<Self> {
+        let mut decoder =
+            Decoder::new_with_limits(Cursor::new(bytes), Limits { bytes: CHUNK_BYTES });
+        decoder.set_transformations(Transformations::EXPAND);
+        let header = decoder.read_header_info().map_err(corrupt)?;
+        // Expanded to at most four channels of 16 bits, and as much again for the filter's lines.
+        let (width, height) = (header.width.into(), header.height.into());
+        check_size(width, height, 8, 8 * RATIO, bytes.len(), most)?;
+        let mut reader = decoder.read_info().map_err(corrupt)?;
+        let size = reader
+            .output_buffer_size()
+            .ok_or_else(|| invalid("the image is too large for memory"))?;
+        let mut data = vec![0; size];
+        let frame = reader.next_frame(&mut data).map_err(corrupt)?;
+        // Reads to the end: texts may stand behind the pixels, and what is cut off shows here.
+        reader.finish().map_err(corrupt)?;
+        let (channels, alpha) = match frame.color_type {
+            ColorType::Grayscale => (1, false),
+            ColorType::GrayscaleAlpha => (2, true),
+            ColorType::Rgb => (3, false),
+            ColorType::Rgba => (4, true),
+            ColorType::Indexed => return Err(invalid("its palette is missing")),
+        };
+        Ok(Self {
+            width: frame.width,
+            height: frame.height,
+            channels,
+            alpha,
+            wide: frame.bit_depth == BitDepth::Sixteen,
+            data,
+            info: reader.info().clone(),
+        })
+    }
+
+    fn count(&self) -> usize {
+        self.width as usize * self.height as usize
+    }
+
+    fn value(&self, index: usize) -> f64 {
+        let data = &self.data;
+        match self.wide {
+            true => f64::from(u16::from_be_bytes([data[2 * index], data[2 * index + 1]])) / 65535.0,
+            false => f64::from(data[index]) / 255.0,
+        }
+    }
+
+    fn opacity(&self, pixel: usize) -> f64 {
+        match self.alpha {
+            true => self.value(pixel * self.channels + self.channels - 1),
+            false => 1.0,
+        }
+    }
+
+    fn colour(&self, pixel: usize) -> [f64; 3] {
+        let first = pixel * self.channels;
+        let grey = self.channels < 3;
+        [0, 1, 2].map(|channel| self.value(if grey { first } else { first + channel }))
+    }
+
+    fn picture(&self, colour: impl Fn(usize) -> [f32; 3]) -> Picture {
+        let pixels = (0..self.count()).map(colour);
+        Picture::new(self.width, self.height, pixels.collect())
+    }
 }
 
 impl Encoding {

@@ -196,7 +196,7 @@ impl Lights {
 
 /// Threshold and alias of each entry: Vose, "A Linear Algorithm for Generating Random Numbers with a
 /// Given Distribution" (IEEE Trans. Software Eng. 17(9), 1991).
-fn alias_table(probabilities: &[f64]) -> Vec<(f64, usize)> {
+pub(super) fn alias_table(probabilities: &[f64]) -> Vec<(f64, usize)> {
     let count = probabilities.len();
     let mut scaled: Vec<f64> = probabilities.iter().map(|p| p * count as f64).collect();
     let mut table: Vec<(f64, usize)> = (0..count).map(|i| (1.0, i)).collect();

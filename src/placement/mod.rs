@@ -11,6 +11,7 @@ pub mod containment;
 pub mod lights;
 pub mod media;
 mod pole;
+pub mod sky;
 mod sphere;
 mod tree;
 mod unit;
@@ -18,14 +19,15 @@ mod unit;
 pub use camera::PlacedCamera;
 pub use lights::{Light, Lights};
 pub use media::{Media, Medium};
+pub use sky::SkyTable;
 pub use sphere::{PlacedSphere, Side};
 
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use glam::DVec3;
 
 use crate::bvh::{Ball, Tree};
-use crate::scene::Scene;
+use crate::scene::{Scene, Sky};
 use crate::settings::Offset;
 use camera::approach;
 use containment::{containers, reachable};
@@ -57,8 +59,9 @@ pub struct Placement {
     pub offset: Offset,
     /// What light sampling chooses from.
     pub lights: Lights,
-    /// Made when it is first asked for.
+    /// Made when it is first asked for, and so is the next.
     tree: OnceLock<Tree>,
+    sky: OnceLock<Arc<SkyTable>>,
 }
 
 impl Placement {
@@ -150,6 +153,7 @@ impl Placement {
             camera,
             offset,
             tree: OnceLock::new(),
+            sky: OnceLock::new(),
         }
     }
 
@@ -160,6 +164,19 @@ impl Placement {
     pub fn tree(&self) -> &Tree {
         self.tree
             .get_or_init(|| Tree::new(&self.balls(), self.poles as u32))
+    }
+
+    /// What light sampling draws directions to the scene's image from.
+    #[must_use]
+    pub fn sky_table(&self, sky: &Sky) -> &SkyTable {
+        self.sky.get_or_init(|| Arc::new(SkyTable::new(sky)))
+    }
+
+    /// The same with another table, for tests of one that is made wrongly.
+    #[must_use]
+    pub fn with_sky_table(mut self, table: SkyTable) -> Self {
+        self.sky = OnceLock::from(Arc::new(table));
+        self
     }
 
     /// The same with another tree, for tests of one that is made wrongly.

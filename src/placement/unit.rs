@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::pole::pole_point;
-use crate::scene::Scene;
+use crate::scene::{Environment, Scene};
 
 /// The power of two that brings the extent of the spheres `all`, without those in pole frames, to [1, 2).
 pub(super) fn length(
@@ -29,11 +29,11 @@ pub(super) fn length(
 /// The unit of radiance for the reachable spheres `all`.
 pub(super) fn radiance(scene: &Scene, all: &[usize], enclosed: bool) -> f64 {
     let emission = |i: &usize| scene.materials[scene.spheres[*i].material].emission;
-    let brightest = all
-        .iter()
-        .map(emission)
-        .chain(scene.environment.filter(|_| !enclosed))
-        .fold(0.0, |most: f64, radiance| most.max(radiance.max_element()));
+    let surfaces = all.iter().map(|i| emission(i).max_element());
+    let environment = scene.environment.iter().filter(|_| !enclosed);
+    let brightest = surfaces
+        .chain(environment.map(Environment::brightest))
+        .fold(0.0, f64::max);
     if brightest > 0.0 {
         (32.0 - brightest.log2().floor()).exp2()
     } else {

@@ -5,8 +5,9 @@ use glam::DVec3;
 use super::core::random::{random4, sample_key};
 use super::core::sobol::sobol4;
 use super::light::aim::aim_at;
-use super::light::environment_radiance;
-use super::light::sphere::{light_pdf, mis_weight, sample_light};
+use super::light::environment::{environment_radiance, sky_place};
+use super::light::skylight::{NO_SPHERE, SKY_SHARE, sample_sky, sky_density};
+use super::light::sphere::{LightSample, light_pdf, mis_weight, sample_light};
 use super::purpose::{CAMERA, lighting, scattering};
 use super::scene::camera::camera_ray;
 use super::scene::priority::{cross_surface, index_within, relative_index};
@@ -14,9 +15,9 @@ use super::scene::ray::{Hit, Ray, Vertex, leave, vertex_at};
 use super::scene::sphere::closest_hit;
 use crate::film::{AovSums, LightClass};
 use crate::materials::{BsdfSample, Event, MaterialKind, Surface, sample_uniform};
-use crate::placement::{Medium, Placement};
+use crate::placement::{Medium, Placement, SkyTable};
 use crate::sampler::Sampler;
-use crate::scene::{Material, Scene};
+use crate::scene::{Environment, Material, Scene, Sky};
 use crate::settings::{Integrator, Settings, stream_words};
 
 /// Survival is the largest component of the throughput over 1/4.
@@ -123,8 +124,10 @@ impl PathTracer<'_> {
     fn extend(&self, path: &mut Path, random: &dyn Fn(u32) -> [f64; 4]) -> bool {
         path.found.rays += 1;
         let Some(hit) = closest_hit(&path.ray, &self.placement.spheres) else {
-            let sky = environment_radiance(self.scene);
-            path.receive(path.class, path.throughput * sky);
+            let w = path.ray.direction;
+            let share = self.share_of_sky(w, path.departure);
+            let sky = environment_radiance(self.scene, w);
+            path.receive(path.class, path.throughput * share * sky);
             return false;
         };
         let sphere = &self.placement.spheres[hit.index];
@@ -150,7 +153,7 @@ impl PathTracer<'_> {
             },
         };
         let wo = -path.ray.direction;
-        if self.samples_lights() {
+        if self.samples_lamps() || self.sky().is_some() {
             let v = random(lighting(path.found.bounces));
             let direct = self.direct_light(&path.ray, &hit, &vertex, &surface, v);
             let class = direct
@@ -226,17 +229,51 @@ impl PathTracer<'_> {
 }
 
 impl PathTracer<'_> {
-    /// Whether vertices look for lights.
-    fn samples_lights(&self) -> bool {
+    /// Whether vertices look for light.
+    fn looks_for_light(&self) -> bool {
         matches!(self.settings.integrator, Integrator::Path | Integrator::Nee)
-            && !self.placement.lights.table.is_empty()
+    }
+
+    /// Whether they look for lamps.
+    fn samples_lamps(&self) -> bool {
+        self.looks_for_light() && !self.placement.lights.table.is_empty()
+    }
+
+    /// The image that they look for.
+    fn sky(&self) -> Option<(&Sky, &SkyTable)> {
+        let environment = self.scene.environment.as_ref();
+        let sky = environment.and_then(Environment::sky)?;
+        let looks = self.looks_for_light() && !self.placement.enclosed;
+        looks.then(|| (sky, self.placement.sky_table(sky)))
+    }
+
+    /// The share of what a ray meets with the pdf `bsdf_pdf` that the path counts, where light sampling finds it with
+    /// the other one.
+    fn share_of_hit(&self, bsdf_pdf: f64, light_pdf: f64) -> f64 {
+        match self.settings.integrator {
+            Integrator::Path => mis_weight(bsdf_pdf, light_pdf),
+            _ if light_pdf > 0.0 => 0.0,
+            _ => 1.0,
+        }
+    }
+
+    /// The share of what is seen of the environment that the path counts.
+    fn share_of_sky(&self, w: DVec3, from: Departure) -> f64 {
+        match self.sky().filter(|_| from.pdf > 0.0) {
+            None => 1.0,
+            Some((sky, table)) => {
+                let share = if self.samples_lamps() { SKY_SHARE } else { 1.0 };
+                let other = share * sky_density(sky, table, sky_place(sky, w));
+                self.share_of_hit(from.pdf, other)
+            }
+        }
     }
 
     /// The share of a hit's emission that the path counts: light sampling where it came from has the rest.
     fn share_of_emission(&self, ray: &Ray, hit: &Hit, from: Departure) -> f64 {
         let lights = &self.placement.lights;
         let light = lights.of_sphere(hit.index);
-        let rivals = self.samples_lights() && from.pdf > 0.0 && !hit.inside;
+        let rivals = self.samples_lamps() && from.pdf > 0.0 && !hit.inside;
         let Some(light) = light.filter(|_| rivals) else {
             return 1.0;
         };
@@ -244,15 +281,43 @@ impl PathTracer<'_> {
         let aim = aim_at(sphere, ray.anchor, ray.offset);
         let pdf_per_weight =
             (!lights.from_table(self.settings.light_sampling)).then_some(from.pdf_per_weight);
-        let other = light_pdf(light, &aim, pdf_per_weight);
-        match self.settings.integrator {
-            Integrator::Path => mis_weight(from.pdf, other),
-            _ if other > 0.0 => 0.0,
-            _ => 1.0,
-        }
+        let share = self.sky().map_or(1.0, |_| 1.0 - SKY_SHARE);
+        self.share_of_hit(from.pdf, share * light_pdf(light, &aim, pdf_per_weight))
     }
 
-    /// What one lamp, chosen at random, sends over a vertex into the path.
+    /// A direction to a lamp or to the image.
+    fn sample_direction(&self, vertex: &Vertex, own: usize, u: [f64; 4]) -> Option<LightSample> {
+        let sampling = self.settings.light_sampling;
+        let lamp = |u| sample_light(self.placement, sampling, vertex, own, u);
+        let Some((sky, table)) = self.sky() else {
+            return lamp(u);
+        };
+        if !self.samples_lamps() {
+            return Some(sample_sky(sky, table, u));
+        }
+        let to_sky = u[2] < SKY_SHARE;
+        let (low, share) = if to_sky {
+            (0.0, SKY_SHARE)
+        } else {
+            (SKY_SHARE, 1.0 - SKY_SHARE)
+        };
+        let v = [u[0], u[1], (u[2] - low) / share, u[3]];
+        let lamp = lamp(v);
+        let pdf_per_weight = lamp.map_or(0.0, |s| s.pdf_per_weight);
+        let chosen = if to_sky {
+            Some(sample_sky(sky, table, v))
+        } else {
+            lamp
+        };
+        chosen.map(|s| LightSample {
+            pdf: share * s.pdf,
+            mis_pdf: share * s.mis_pdf,
+            pdf_per_weight,
+            ..s
+        })
+    }
+
+    /// What one lamp, chosen at random, or the image sends over a vertex into the path.
     fn direct_light(
         &self,
         ray: &Ray,
@@ -268,8 +333,7 @@ impl PathTracer<'_> {
         if kind.is_delta() {
             return direct;
         }
-        let sampling = self.settings.light_sampling;
-        let Some(s) = sample_light(self.placement, sampling, vertex, hit.index, u) else {
+        let Some(s) = self.sample_direction(vertex, hit.index, u) else {
             return direct;
         };
         direct.pdf_per_weight = s.pdf_per_weight;
@@ -296,7 +360,12 @@ impl PathTracer<'_> {
             Integrator::Path => mis_weight(s.mis_pdf, f.pdf),
             _ => 1.0,
         };
-        direct.radiance = share / s.pdf * f.f_cos * material(s.sphere).emission;
+        let radiance = if s.sphere == NO_SPHERE {
+            environment_radiance(self.scene, s.wi)
+        } else {
+            material(s.sphere).emission
+        };
+        direct.radiance = share / s.pdf * f.f_cos * radiance;
         direct
     }
 }

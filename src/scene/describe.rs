@@ -6,7 +6,8 @@ use std::fmt::{self, Write};
 use glam::DVec3;
 
 use super::load::Loaded;
-use super::{Handedness, Scene};
+use super::{Environment, Gradient, Handedness, Scene};
+use crate::numbers::significant;
 
 /// So many lights are listed one by one.
 const LIGHTS_LISTED: usize = 8;
@@ -89,7 +90,7 @@ fn lights(text: &mut String, scene: &Scene) -> fmt::Result {
         }
     }
     let spheres: usize = by_material.values().sum();
-    match (spheres, scene.environment) {
+    match (spheres, &scene.environment) {
         (0, None) => writeln!(text, "lights       none")?,
         (0, Some(_)) => writeln!(text, "lights       the environment")?,
         (count, None) => writeln!(text, "lights       {}", counted(count, "sphere"))?,
@@ -99,8 +100,8 @@ fn lights(text: &mut String, scene: &Scene) -> fmt::Result {
             counted(count, "sphere")
         )?,
     }
-    if let Some(radiance) = scene.environment {
-        writeln!(text, "  environment with radiance {}", triple(radiance))?;
+    if let Some(environment) = &scene.environment {
+        writeln!(text, "  environment {}", in_words(environment))?;
     }
     for (&index, &count) in by_material.iter().take(LIGHTS_LISTED) {
         let material = &scene.materials[index];
@@ -120,6 +121,37 @@ fn lights(text: &mut String, scene: &Scene) -> fmt::Result {
         )?;
     }
     Ok(())
+}
+
+fn in_words(environment: &Environment) -> String {
+    match environment {
+        Environment::Constant(radiance) => format!("with radiance {}", triple(*radiance)),
+        Environment::Gradient(Gradient {
+            zenith,
+            horizon,
+            ground,
+        }) => {
+            let [zenith, horizon, ground] =
+                [zenith, horizon, ground].map(|radiance| triple(*radiance));
+            format!(
+                "with radiance {zenith} at the zenith, {horizon} at the horizon, {ground} below"
+            )
+        }
+        Environment::Sky(sky) => {
+            let (image, name) = (sky.image(), sky.name().escape_debug());
+            let mut text = format!("{name}, {} x {} texels", image.width, image.height);
+            if sky.scale() != DVec3::ONE {
+                text += &format!(", times {}", triple(sky.scale()));
+            }
+            if sky.rotation() != 0.0 {
+                text += &format!(", turned by {} degrees", sky.rotation());
+            }
+            format!(
+                "{text}, with radiance up to {}",
+                significant(environment.brightest())
+            )
+        }
+    }
 }
 
 fn triple(vector: DVec3) -> String {

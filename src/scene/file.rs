@@ -44,10 +44,10 @@ pub(super) struct SceneFile {
     #[serde(default)]
     #[schemars(with = "RenderTable")]
     pub(super) render: RenderTable,
-    /// The constant environment; black without this table.
+    /// What a path sees that hits nothing; black without this table.
     #[schemars(with = "EnvironmentTable")]
     #[serde(default)]
-    pub(super) environment: Option<EnvironmentTable>,
+    pub(super) environment: Option<Spanned<EnvironmentTable>>,
     /// The materials, by name.
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, MaterialTable>")]
@@ -126,13 +126,64 @@ pub(super) struct RenderTable {
     pub(super) max_bounces: Option<u32>,
 }
 
-/// A constant environment.
+/// What a path sees that hits nothing: one of `radiance`, `gradient` and `image`.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(extend("anyOf" = [
+    { "required": ["radiance"] }, { "required": ["gradient"] }, { "required": ["image"] },
+]))]
 pub(super) struct EnvironmentTable {
     /// Radiance from every direction.
+    #[serde(default)]
     #[schemars(schema_with = "radiance")]
-    pub(super) radiance: [f64; 3],
+    pub(super) radiance: Option<Spanned<[f64; 3]>>,
+    /// Radiance by height.
+    #[serde(default)]
+    #[schemars(with = "GradientTable")]
+    pub(super) gradient: Option<Spanned<GradientTable>>,
+    /// An EXR, PNG or JPEG file of radiances, all around the axis +y; relative to the scene file's folder.
+    #[serde(default)]
+    #[schemars(with = "String")]
+    pub(super) image: Option<Spanned<String>>,
+    /// What the image's values are multiplied by: a number, or one for each channel.
+    #[serde(default)]
+    #[schemars(schema_with = "scale")]
+    pub(super) scale: Option<Spanned<ScaleValue>>,
+    /// By how much the image is turned about +y, from +x towards +z, in degrees.
+    #[serde(default)]
+    #[schemars(
+        with = "f64",
+        range(min = -MAX_MAGNITUDE, max = MAX_MAGNITUDE),
+        extend("default" = 0.0)
+    )]
+    pub(super) rotation: Option<Spanned<f64>>,
+    /// Whether the values of PNG and JPEG files are linear; without this key they are sRGB. EXR files are linear.
+    #[serde(default)]
+    #[schemars(with = "bool", extend("default" = false))]
+    pub(super) linear: Option<Spanned<bool>>,
+}
+
+/// A number or one for each channel.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(untagged)]
+pub(super) enum ScaleValue {
+    Number(f64),
+    Channels([f64; 3]),
+}
+
+/// Radiance by height: mix(horizon, zenith, w.y) above for the direction w, `ground` below.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct GradientTable {
+    /// Radiance from straight above, +y.
+    #[schemars(schema_with = "radiance")]
+    pub(super) zenith: [f64; 3],
+    /// Radiance from the horizon.
+    #[schemars(schema_with = "radiance")]
+    pub(super) horizon: [f64; 3],
+    /// Radiance from everywhere below the horizon.
+    #[schemars(schema_with = "radiance")]
+    pub(super) ground: [f64; 3],
 }
 
 /// A material: `type` decides which other keys it has. Any material may emit.
@@ -264,6 +315,18 @@ pub(super) enum RadiusValue {
 
 fn radius(_: &mut SchemaGenerator) -> Schema {
     json_schema!({ "type": ["number", "string"], "exclusiveMinimum": 0.0, "maximum": MAX_MAGNITUDE })
+}
+
+fn scale(_: &mut SchemaGenerator) -> Schema {
+    json_schema!({
+        "type": ["number", "array"],
+        "minimum": 0.0,
+        "maximum": MAX_MAGNITUDE,
+        "items": { "type": "number", "minimum": 0.0, "maximum": MAX_MAGNITUDE },
+        "minItems": 3,
+        "maxItems": 3,
+        "default": 1.0,
+    })
 }
 
 fn words<'w>(words: impl Iterator<Item = &'w str>, default: Option<&str>) -> Schema {

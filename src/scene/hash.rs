@@ -8,7 +8,8 @@ use std::path::Path;
 use fnv::FnvHasher;
 use glam::DVec3;
 
-use super::{Handedness, Scene};
+use super::{Environment, Gradient, Handedness, Scene};
+use crate::image::Picture;
 use crate::materials::{MaterialKind, Value};
 
 /// Hash of everything in the scene that the image depends on: 16 hexadecimal digits.
@@ -36,7 +37,7 @@ pub fn content_hash(scene: &Scene) -> String {
     }
     hash.bytes(&scene.width.to_le_bytes());
     hash.bytes(&scene.height.to_le_bytes());
-    hash.vector(scene.environment.unwrap_or_default());
+    hash.environment(scene.environment.as_ref());
     hash.bytes(&(scene.spheres.len() as u64).to_le_bytes());
     for sphere in &scene.spheres {
         hash.vector(sphere.center);
@@ -88,6 +89,37 @@ impl Fnv {
     fn vector(&mut self, vector: DVec3) {
         for number in vector.to_array() {
             self.number(number);
+        }
+    }
+
+    fn environment(&mut self, environment: Option<&Environment>) {
+        match environment {
+            None => self.vector(DVec3::ZERO),
+            Some(Environment::Constant(radiance)) => self.vector(*radiance),
+            Some(Environment::Gradient(Gradient {
+                zenith,
+                horizon,
+                ground,
+            })) => {
+                self.bytes(b"gradient");
+                for radiance in [zenith, horizon, ground] {
+                    self.vector(*radiance);
+                }
+            }
+            Some(Environment::Sky(sky)) => {
+                self.bytes(b"image");
+                self.vector(sky.scale());
+                self.number(sky.rotation());
+                self.image(sky.image());
+            }
+        }
+    }
+
+    fn image(&mut self, image: &Picture) {
+        self.bytes(&image.width.to_le_bytes());
+        self.bytes(&image.height.to_le_bytes());
+        for value in image.pixels.as_flattened() {
+            self.bytes(&value.to_bits().to_le_bytes());
         }
     }
 
@@ -144,6 +176,20 @@ mod tests {
             MaterialKind::Reflective(m) => m.mu += 1.0,
             MaterialKind::Conductor(m) => m.roughness += 0.1,
         };
+        let gradient = |zenith| {
+            let [horizon, ground] = [DVec3::ZERO; 2];
+            Some(Environment::Gradient(Gradient {
+                zenith,
+                horizon,
+                ground,
+            }))
+        };
+        let mut changed: Vec<Scene> = [DVec3::ONE, DVec3::X]
+            .map(|zenith| Scene {
+                environment: gradient(zenith),
+                ..scene()
+            })
+            .into();
         let changes: [fn(&mut Scene); 14] = [
             |scene| scene.camera.position.x = 1e-300,
             |scene| scene.camera.look_at.y = 1.0,
@@ -164,8 +210,9 @@ mod tests {
         for alter in changes {
             let mut scene = scene();
             alter(&mut scene);
-            hashes.push(content_hash(&scene));
+            changed.push(scene);
         }
+        hashes.extend(changed.iter().map(content_hash));
         for index in 0..4 {
             let mut scene = scene();
             change(&mut scene.materials[index].kind);

@@ -6,8 +6,10 @@
 
 pub mod builtin;
 mod describe;
+pub mod environment;
 mod file;
 mod hash;
+mod image;
 pub mod load;
 pub mod particles;
 mod pieces;
@@ -20,6 +22,7 @@ mod suggest;
 mod validate;
 
 pub use describe::summary;
+pub use environment::{Environment, Gradient, Sky};
 pub use file::{MAX_BOUNCES, MAX_SIDE, MAX_SPP, json_schema};
 pub use hash::{content_hash, file_hash};
 pub use load::Loaded;
@@ -40,8 +43,8 @@ pub struct Scene {
     pub height: u32,
     /// What the scene file's `[render]` table asks for; the command line wins.
     pub render: RenderDefaults,
-    /// Radiance of the constant environment; `None` is black, and costs nothing.
-    pub environment: Option<DVec3>,
+    /// What a path sees that hits nothing; `None` is black, and costs nothing.
+    pub environment: Option<Environment>,
     /// All materials, in file order.
     pub materials: Vec<Material>,
     /// All spheres, in file order.

@@ -8,7 +8,8 @@ use proptest::prelude::*;
 use super::load::load_str;
 use super::validate::SHORTEST;
 use super::{
-    Camera, Handedness, MAX_BOUNCES, MAX_SIDE, MAX_SPP, Material, RenderDefaults, Scene, Sphere,
+    Camera, Environment, Gradient, Handedness, MAX_BOUNCES, MAX_SIDE, MAX_SPP, Material,
+    RenderDefaults, Scene, Sphere,
 };
 use crate::error::Error;
 use crate::materials::schema::MAX_MAGNITUDE;
@@ -41,8 +42,18 @@ fn to_toml(scene: &Scene) -> String {
     if let Some(bounces) = scene.render.max_bounces {
         add(format!("max_bounces = {bounces}"));
     }
-    if let Some(radiance) = scene.environment {
-        add(format!("[environment]\nradiance = {}", vector(radiance)));
+    match &scene.environment {
+        None => {}
+        Some(Environment::Constant(radiance)) => {
+            add(format!("[environment]\nradiance = {}", vector(*radiance)));
+        }
+        Some(Environment::Sky(_)) => unreachable!("random scenes have no files"),
+        Some(Environment::Gradient(gradient)) => add(format!(
+            "[environment.gradient]\nzenith = {}\nhorizon = {}\nground = {}",
+            vector(gradient.zenith),
+            vector(gradient.horizon),
+            vector(gradient.ground)
+        )),
     }
     for material in &scene.materials {
         add(format!(
@@ -93,6 +104,18 @@ fn radiance() -> impl Strategy<Value = DVec3> {
     three(prop_oneof![Just(0.0), positive()].boxed())
 }
 
+fn environment() -> impl Strategy<Value = Environment> {
+    let gradient = [radiance(), radiance(), radiance()];
+    prop_oneof![
+        radiance().prop_map(Environment::Constant),
+        gradient.prop_map(|[zenith, horizon, ground]| Environment::Gradient(Gradient {
+            zenith,
+            horizon,
+            ground,
+        })),
+    ]
+}
+
 /// The test cases of all materials; what their numbers may be is the schema's, and damaged elsewhere.
 fn kind() -> impl Strategy<Value = MaterialKind> {
     let all: Vec<MaterialKind> = ALL.iter().flat_map(|material| (material.cases)()).collect();
@@ -139,7 +162,7 @@ fn scene() -> impl Strategy<Value = Scene> {
         camera(),
         (1..=MAX_SIDE, 1..=MAX_SIDE),
         render,
-        prop::option::of(radiance().prop_filter("not black", |r| *r != DVec3::ZERO)),
+        prop::option::of(environment().prop_filter("not black", |e| e.brightest() > 0.0)),
         materials,
         prop::collection::vec(sphere, 0..8).prop_filter("lengths to compute with", |spheres| {
             spheres.is_empty() || spheres.iter().any(|sphere| sphere.1 > SHORTEST)

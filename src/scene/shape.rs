@@ -144,11 +144,15 @@ fn check_value(
     report: &mut Report,
 ) {
     let kind = match schema["type"].as_array() {
-        // A number or a word.
+        // A number, or a word, or an array.
         Some(kinds) => kinds
             .iter()
             .filter_map(Value::as_str)
-            .find(|kind| *kind == "string" || value.get_ref().as_str().is_none())
+            .find(|kind| match value.get_ref() {
+                DeValue::String(_) => *kind == "string",
+                DeValue::Array(_) => *kind == "array",
+                _ => *kind == "number",
+            })
             .unwrap_or("number"),
         None => schema["type"].as_str().unwrap_or("object"),
     };
@@ -185,6 +189,7 @@ fn check_value(
                 report.errors.push(problem);
             }
         }
+        ("boolean", DeValue::Boolean(_)) => {}
         ("string", DeValue::String(text)) => {
             let choices = schema["enum"].as_array();
             let choices = || choices.into_iter().flatten().filter_map(Value::as_str);

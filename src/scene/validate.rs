@@ -12,7 +12,7 @@ use super::load::{Parsed, Place};
 use super::particles;
 use super::report::{Problem, Report, SHOWN};
 use super::suggest::{list, nearest};
-use super::{Camera, Handedness, Material, RenderDefaults, Scene, Sphere};
+use super::{Camera, Handedness, Material, RenderDefaults, Scene, Sphere, environment};
 use crate::materials::Mistake;
 
 /// Directions whose angle has a smaller sine are parallel: of the sixteen digits of an f64 the
@@ -176,6 +176,9 @@ pub(super) fn scene(
             .push(problem.help(format!("one of them must have at least {SHORTEST:e}")));
     }
 
+    let environment = file.environment.as_ref();
+    let environment = environment
+        .and_then(|table| environment::of_table(table, place.folder, &mut files, report));
     let scene = Scene {
         camera: camera?,
         width: file.image.width,
@@ -184,10 +187,7 @@ pub(super) fn scene(
             spp: file.render.spp,
             max_bounces: file.render.max_bounces,
         },
-        environment: file
-            .environment
-            .map(|environment| vector(environment.radiance))
-            .filter(|radiance| *radiance != DVec3::ZERO),
+        environment,
         materials,
         spheres,
     };
@@ -324,7 +324,7 @@ fn of_use(vector: DVec3) -> DVec3 {
 }
 
 /// The vector, without negative zeros: the two zeros are equal and must hash alike.
-fn vector(values: [f64; 3]) -> DVec3 {
+pub(super) fn vector(values: [f64; 3]) -> DVec3 {
     DVec3::from_array(values) + 0.0
 }
 

@@ -46,7 +46,7 @@ pub(super) fn geometry(placement: &Placement, effects: &Effects) -> String {
         }
     }
     closest_hit(&mut text, placement, effects);
-    if effects.has(Effect::Lights) {
+    if effects.samples_light() {
         text += "fn lamp_hit(ray: Ray, lamp: u32, limb: f32) -> Hit {\n\
                  return closest_hit(ray);\n}\n";
     }

@@ -12,14 +12,16 @@ pub mod steps;
 pub use bsdf::members as material_members;
 pub use names::declared_names;
 
+use glam::DVec3;
 use wesl::{CompileOptions, ManglerKind, ModulePath, VirtualResolver, Wesl};
 
 use crate::bvh;
 use crate::effects::{Effect, Effects, Role};
 use crate::error::{Error, Result};
+use crate::gpu::layout::SKY_TABLE_WIDTH;
 use crate::materials;
 use crate::placement::{Medium, Placement};
-use crate::scene::Scene;
+use crate::scene::{Environment, Scene};
 
 pub use binding::Binding;
 
@@ -224,10 +226,7 @@ fn config(scene: &Scene, placement: &Placement, effects: &Effects) -> String {
         "const RAY_STEPS: u32 = {}u;\n",
         steps::vertex_steps(placement, effects)
     );
-    if effects.has(Effect::Environment) {
-        let radiance = scene.environment.unwrap_or_default() * placement.radiance_scale;
-        text += &format!("const ENVIRONMENT: vec3f = {};\n", baked::vector(radiance));
-    }
+    text += &environment(scene, placement, effects);
     if effects.has(Effect::Lights) {
         let count = placement.lights.table.len().max(1);
         text += &format!("const LIGHT_COUNT: u32 = {count}u;\n");
@@ -241,6 +240,43 @@ fn config(scene: &Scene, placement: &Placement, effects: &Effects) -> String {
         );
     }
     text += &initial_media(placement, effects);
+    text
+}
+
+/// What paths see that hit nothing.
+fn environment(scene: &Scene, placement: &Placement, effects: &Effects) -> String {
+    let scaled = |radiance: DVec3| baked::vector(radiance * placement.radiance_scale);
+    let environment = scene.environment.as_ref();
+    let mut text = String::new();
+    if effects.has(Effect::Environment) {
+        let radiance = environment.and_then(Environment::constant);
+        let radiance = scaled(radiance.unwrap_or_default());
+        text += &format!("const ENVIRONMENT: vec3f = {radiance};\n");
+    }
+    if effects.has(Effect::Gradient)
+        && let Some(Environment::Gradient(gradient)) = environment
+    {
+        for (name, radiance) in [
+            ("ZENITH", gradient.zenith),
+            ("HORIZON", gradient.horizon),
+            ("GROUND", gradient.ground),
+        ] {
+            text += &format!("const GRADIENT_{name}: vec3f = {};\n", scaled(radiance));
+        }
+    }
+    if effects.has(Effect::Sky)
+        && let Some(sky) = environment.and_then(Environment::sky)
+    {
+        text += &format!(
+            "const SKY_WIDTH: u32 = {}u;\nconst SKY_HEIGHT: u32 = {}u;\nconst SKY_TURN: f32 = {};\n",
+            sky.image().width,
+            sky.image().height,
+            baked::number(sky.rotation() / 360.0)
+        );
+    }
+    if effects.has(Effect::Skylight) {
+        text += &format!("const SKY_TABLE_WIDTH: u32 = {SKY_TABLE_WIDTH}u;\n");
+    }
     text
 }
 

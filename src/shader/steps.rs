@@ -92,7 +92,7 @@ pub const LOOPS: [Loop; 8] = [
 
 /// Rays that are traced at a vertex: with light sampling also one to a light.
 fn rays(effects: &Effects) -> usize {
-    1 + usize::from(effects.has(Effect::Lights))
+    1 + usize::from(effects.samples_light())
 }
 
 /// Most loop iterations that the kernel makes for one vertex of a path, but for those of loops that count themselves.

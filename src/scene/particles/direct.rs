@@ -11,7 +11,9 @@ use super::{Ball, Cloud, Coloring, Fault, RadiusBy, Request, Similarity, gather}
 use crate::error::{Error, Result};
 use crate::materials::diffuse::{self, Diffuse};
 use crate::scene::load::{Loaded, Source};
-use crate::scene::{Camera, Handedness, Material, RenderDefaults, Scene, Sphere, content_hash};
+use crate::scene::{
+    Camera, Environment, Handedness, Material, RenderDefaults, Scene, Sphere, content_hash,
+};
 
 /// Size of the picture, in pixels.
 const SIZE: [u32; 2] = [960, 720];
@@ -223,7 +225,7 @@ fn scene(cloud: Cloud, view: &View, background: DVec3) -> Scene {
         width: SIZE[0],
         height: SIZE[1],
         render: RenderDefaults::default(),
-        environment: Some(background).filter(|radiance| *radiance != DVec3::ZERO),
+        environment: (background != DVec3::ZERO).then_some(Environment::Constant(background)),
         materials,
         spheres,
     }
