@@ -42,6 +42,7 @@ mod naive;
 mod output;
 mod particles;
 mod placement;
+mod powers;
 mod price;
 mod projected;
 mod references;

@@ -8,6 +8,10 @@
 mod contract;
 mod form;
 pub mod ggx;
+#[cfg(test)]
+mod hemisphere;
+pub mod lobes;
+pub mod powers;
 pub mod schema;
 mod uniform;
 
@@ -177,6 +181,7 @@ materials! {
     dielectric::Dielectric,
     reflective::Reflective,
     conductor::Conductor,
+    ashikhmin::Ashikhmin,
 }
 
 impl MaterialKind {

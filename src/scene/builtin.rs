@@ -45,6 +45,11 @@ pub const GALLERY: &[Builtin] = &[
         description: "480 spheres of all materials under a sky, through a thin lens",
         text: include_str!("../../scenes/field.toml"),
     },
+    Builtin {
+        name: "ashikhmin",
+        description: "the anisotropic Phong model: plastic from dull to polished, and brushed metals",
+        text: include_str!("../../scenes/ashikhmin.toml"),
+    },
 ];
 
 /// The names of the built-in scenes, the default one first.
