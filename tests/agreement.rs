@@ -137,6 +137,7 @@ fn perturbed(scene: &Scene, factor: f64) -> Scene {
             MaterialKind::Reflective(m) => m.albedo *= factor,
             MaterialKind::Conductor(m) => m.k = m.k.map(|k| factor * k),
             MaterialKind::Ashikhmin(m) => m.diffuse *= factor,
+            MaterialKind::Disney(m) => m.base_color *= factor,
         }
     }
     scene

@@ -12,6 +12,7 @@ pub mod ggx;
 mod hemisphere;
 pub mod lobes;
 pub mod powers;
+mod scattered;
 pub mod schema;
 mod uniform;
 
@@ -182,6 +183,7 @@ materials! {
     reflective::Reflective,
     conductor::Conductor,
     ashikhmin::Ashikhmin,
+    disney::Disney,
 }
 
 impl MaterialKind {
@@ -237,7 +239,7 @@ mod tests {
             .filter(|material| material.has_colors())
             .collect();
         let names: Vec<_> = colored.iter().map(|material| material.name).collect();
-        assert_eq!(names, ["diffuse", "mirror"]);
+        assert_eq!(names, ["diffuse", "mirror", "disney"]);
         for material in colored {
             let made = material.of_color(color).expect(material.name);
             assert_eq!((made.name(), made.color()), (material.name, color));

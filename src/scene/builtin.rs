@@ -50,6 +50,11 @@ pub const GALLERY: &[Builtin] = &[
         description: "the anisotropic Phong model: plastic from dull to polished, and brushed metals",
         text: include_str!("../../scenes/ashikhmin.toml"),
     },
+    Builtin {
+        name: "disney",
+        description: "the principled model of 2012: plastic, skin, metals, velvet, lacquer",
+        text: include_str!("../../scenes/disney.toml"),
+    },
 ];
 
 /// The names of the built-in scenes, the default one first.
