@@ -138,6 +138,7 @@ fn perturbed(scene: &Scene, factor: f64) -> Scene {
             MaterialKind::Conductor(m) => m.k = m.k.map(|k| factor * k),
             MaterialKind::Ashikhmin(m) => m.diffuse *= factor,
             MaterialKind::Disney(m) => m.base_color *= factor,
+            MaterialKind::Sheen(m) => m.color *= factor,
         }
     }
     scene

@@ -184,6 +184,7 @@ materials! {
     conductor::Conductor,
     ashikhmin::Ashikhmin,
     disney::Disney,
+    sheen::Sheen,
 }
 
 impl MaterialKind {

@@ -55,6 +55,11 @@ pub const GALLERY: &[Builtin] = &[
         description: "the principled model of 2012: plastic, skin, metals, velvet, lacquer",
         text: include_str!("../../scenes/disney.toml"),
     },
+    Builtin {
+        name: "sheen",
+        description: "cloth of rising roughness, lit from behind",
+        text: include_str!("../../scenes/sheen.toml"),
+    },
 ];
 
 /// The names of the built-in scenes, the default one first.
