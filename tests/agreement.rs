@@ -139,6 +139,7 @@ fn perturbed(scene: &Scene, factor: f64) -> Scene {
             MaterialKind::Ashikhmin(m) => m.diffuse *= factor,
             MaterialKind::Disney(m) => m.base_color *= factor,
             MaterialKind::Sheen(m) => m.color *= factor,
+            MaterialKind::Nylon(m) => m.diffuse *= factor,
         }
     }
     scene

@@ -185,6 +185,7 @@ materials! {
     ashikhmin::Ashikhmin,
     disney::Disney,
     sheen::Sheen,
+    nylon::Nylon,
 }
 
 impl MaterialKind {

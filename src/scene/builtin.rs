@@ -60,6 +60,11 @@ pub const GALLERY: &[Builtin] = &[
         description: "cloth of rising roughness, lit from behind",
         text: include_str!("../../scenes/sheen.toml"),
     },
+    Builtin {
+        name: "nylon",
+        description: "nylon as measured, dyed, and with other distributions of microfacets",
+        text: include_str!("../../scenes/nylon.toml"),
+    },
 ];
 
 /// The names of the built-in scenes, the default one first.

@@ -146,6 +146,7 @@ mod tests {
             MaterialKind::Ashikhmin(m) => m.nv += 0.1,
             MaterialKind::Disney(m) => m.clearcoat += 0.1,
             MaterialKind::Sheen(m) => m.roughness += 0.1,
+            MaterialKind::Nylon(m) => m.a.y += 0.1,
         };
         let changes: [fn(&mut Scene); 14] = [
             |scene| scene.camera.position.x = 1e-300,
