@@ -9,6 +9,7 @@ mod thorough;
 
 mod adaptive;
 mod agreement;
+mod albedo_variance;
 mod aov;
 mod bvh;
 mod check;
@@ -37,6 +38,7 @@ mod layout;
 mod ledger;
 mod lights;
 mod limits;
+mod material_keys;
 mod materials;
 mod naive;
 mod output;
