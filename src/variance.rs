@@ -1,6 +1,8 @@
 //! What the materials of a scene say about an estimate: whether samples can show its variance, and what
 //! the bounce limit can have cost.
 
+use std::collections::BTreeSet;
+
 use crate::film::{Estimate, Film};
 use crate::materials::MaterialKind;
 use crate::placement::{PlacedSphere, Placement, Side};
@@ -18,12 +20,8 @@ pub fn energy_cut_at_most(scene: &Scene, film: &Film) -> Option<f64> {
     if tally.cut_paths == 0 {
         return Some(0.0);
     }
-    let used = || {
-        scene
-            .spheres
-            .iter()
-            .map(|sphere| &scene.materials[sphere.material])
-    };
+    let places: BTreeSet<usize> = scene.spheres.iter().map(|s| s.material).collect();
+    let used = || places.iter().map(|place| &scene.materials[*place]);
     let albedo = used()
         .map(|material| material.kind.albedo().max_element())
         .fold(0.0, f64::max);
@@ -166,8 +164,14 @@ fn worst_cycle(scene: &Scene, placement: &Placement, k: i32, termination: f64) -
         {
             let mut materials = vec![first.material, second.material];
             materials.dedup();
+            // A surface that takes all ends every path, whatever the other one does.
+            let ended = second.factor == 0.0;
             cycles.push(Cycle {
-                factor: (first.factor * second.factor).sqrt(),
+                factor: if ended {
+                    0.0
+                } else {
+                    (first.factor * second.factor).sqrt()
+                },
                 materials,
                 channel,
             });

@@ -136,6 +136,10 @@ fn perturbed(scene: &Scene, factor: f64) -> Scene {
             MaterialKind::Dielectric(m) => m.ior = 1.0 + factor * (m.ior - 1.0),
             MaterialKind::Reflective(m) => m.albedo *= factor,
             MaterialKind::Conductor(m) => m.k = m.k.map(|k| factor * k),
+            MaterialKind::Ashikhmin(m) => m.diffuse *= factor,
+            MaterialKind::Disney(m) => m.base_color *= factor,
+            MaterialKind::Sheen(m) => m.color *= factor,
+            MaterialKind::Nylon(m) => m.diffuse *= factor,
         }
     }
     scene

@@ -143,7 +143,7 @@ fn words_that_are_no_scene_are_refused() {
     let table = "
         lectrue | `lectrue` | did you mean `lecture`
         galss | `galss` | did you mean `glass`
-        something | `something` | lecture, lecture-reflective, glass, field
+        something | `something` | lecture, lecture-reflective, glass, field, ashikhmin, disney, sheen, nylon
         missing.toml | missing.toml | No such file
         ./missing/lecture | ./missing/lecture | No such file
         folder.png | folder.png | directory

@@ -12,7 +12,7 @@
 use crate::common::{job, render_cpu, render_gpu, scene};
 use gpu_trace::film::Film;
 use gpu_trace::sampler::Sampler;
-use gpu_trace::scene::Scene;
+use gpu_trace::scene::{Scene, Sphere};
 use gpu_trace::settings::{Integrator, Settings};
 use gpu_trace::statistics::{mean_and_error, normal_limit};
 use gpu_trace::variance::VarianceClass;
@@ -283,6 +283,30 @@ fn balls(materials: &[&str]) -> Scene {
         );
     }
     scene(&text)
+}
+
+#[test]
+fn weights_without_a_bound_count() {
+    use VarianceClass::{Finite, Infinite};
+    let shiny =
+        "type = \"ashikhmin\"\ndiffuse = [0, 0, 0]\nspecular = [0.1, 0, 0]\nnu = 10\nnv = 10";
+    let black = diffuse(0.0);
+    let of = |scene: &Scene| class_with(scene, lecture(0.2), 64);
+    assert_eq!(of(&balls(&[shiny, shiny])), Infinite);
+    assert_eq!(of(&balls(&[shiny, &black])), Finite);
+    // Within a shiny room a black ball ends some paths, not all.
+    let mut room = closed(shiny);
+    assert_eq!(of(&room), Infinite);
+    let ball = balls(&[black.as_str()]);
+    room.materials.extend(ball.materials.iter().cloned());
+    let material = room.materials.len() - 1;
+    let inner = ball.spheres.iter().cloned().map(|sphere| Sphere {
+        radius: 0.1,
+        material,
+        ..sphere
+    });
+    room.spheres.extend(inner);
+    assert_eq!(of(&room), Infinite);
 }
 
 #[test]

@@ -183,17 +183,12 @@ impl Bsdf for Conductor {
     fn mistake(&self) -> Option<Mistake> {
         let given = [self.eta.is_some(), self.k.is_some()];
         let (key, what, help) = match (self.preset.is_some(), given) {
-            _ if self.axis == DVec3::ZERO => (
-                "axis",
-                "`axis` has no direction: its length is 0",
-                schema::AXIS_HELP,
-            ),
             (true, [true, _]) => ("eta", "`eta` and `preset` are both given", PRESET_HELP),
             (true, [_, true]) => ("k", "`k` and `preset` are both given", PRESET_HELP),
             (false, [false, false]) => ("type", "a conductor needs its index", INDEX_HELP),
             (false, [true, false]) => ("eta", "`eta` needs `k` beside it", INDEX_HELP),
             (false, [false, true]) => ("k", "`k` needs `eta` beside it", INDEX_HELP),
-            _ => return None,
+            _ => return schema::axis_mistake(self.axis),
         };
         Some(Mistake { key, what, help })
     }

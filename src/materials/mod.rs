@@ -8,6 +8,11 @@
 mod contract;
 mod form;
 pub mod ggx;
+#[cfg(test)]
+mod hemisphere;
+pub mod lobes;
+pub mod powers;
+mod scattered;
 pub mod schema;
 mod uniform;
 
@@ -177,6 +182,10 @@ materials! {
     dielectric::Dielectric,
     reflective::Reflective,
     conductor::Conductor,
+    ashikhmin::Ashikhmin,
+    disney::Disney,
+    sheen::Sheen,
+    nylon::Nylon,
 }
 
 impl MaterialKind {
@@ -232,7 +241,7 @@ mod tests {
             .filter(|material| material.has_colors())
             .collect();
         let names: Vec<_> = colored.iter().map(|material| material.name).collect();
-        assert_eq!(names, ["diffuse", "mirror"]);
+        assert_eq!(names, ["diffuse", "mirror", "disney"]);
         for material in colored {
             let made = material.of_color(color).expect(material.name);
             assert_eq!((made.name(), made.color()), (material.name, color));

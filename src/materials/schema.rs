@@ -3,6 +3,8 @@
 use glam::DVec3;
 use schemars::{Schema, SchemaGenerator, json_schema};
 
+use super::Mistake;
+
 /// The largest magnitude of any number: its square still fits the f64 in which scenes are kept,
 /// and it fits the f32 of the GPU.
 pub const MAX_MAGNITUDE: f64 = 1e20;
@@ -41,5 +43,12 @@ pub fn up() -> DVec3 {
     DVec3::Y
 }
 
-/// What to do about an axis without a direction.
-pub const AXIS_HELP: &str = "`axis = [0.0, 1.0, 0.0]` is the default";
+/// What is wrong with an axis.
+#[must_use]
+pub fn axis_mistake(axis: DVec3) -> Option<Mistake> {
+    (axis == DVec3::ZERO).then_some(Mistake {
+        key: "axis",
+        what: "`axis` has no direction: its length is 0",
+        help: "`axis = [0.0, 1.0, 0.0]` is the default",
+    })
+}

@@ -45,6 +45,26 @@ pub const GALLERY: &[Builtin] = &[
         description: "480 spheres of all materials under a sky, through a thin lens",
         text: include_str!("../../scenes/field.toml"),
     },
+    Builtin {
+        name: "ashikhmin",
+        description: "the anisotropic Phong model: plastic from dull to polished, and brushed metals",
+        text: include_str!("../../scenes/ashikhmin.toml"),
+    },
+    Builtin {
+        name: "disney",
+        description: "the principled model of 2012: plastic, skin, metals, velvet, lacquer",
+        text: include_str!("../../scenes/disney.toml"),
+    },
+    Builtin {
+        name: "sheen",
+        description: "cloth of rising roughness, lit from behind",
+        text: include_str!("../../scenes/sheen.toml"),
+    },
+    Builtin {
+        name: "nylon",
+        description: "nylon as measured, dyed, and with other distributions of microfacets",
+        text: include_str!("../../scenes/nylon.toml"),
+    },
 ];
 
 /// The names of the built-in scenes, the default one first.

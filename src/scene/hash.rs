@@ -175,6 +175,10 @@ mod tests {
             MaterialKind::Dielectric(m) => m.ior += 1e-9,
             MaterialKind::Reflective(m) => m.mu += 1.0,
             MaterialKind::Conductor(m) => m.roughness += 0.1,
+            MaterialKind::Ashikhmin(m) => m.nv += 0.1,
+            MaterialKind::Disney(m) => m.clearcoat += 0.1,
+            MaterialKind::Sheen(m) => m.roughness += 0.1,
+            MaterialKind::Nylon(m) => m.a.y += 0.1,
         };
         let gradient = |zenith| {
             let [horizon, ground] = [DVec3::ZERO; 2];

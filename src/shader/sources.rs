@@ -32,6 +32,8 @@ sources![
     "light/weighed",
     "materials/contract",
     "materials/ggx",
+    "materials/lobes",
+    "materials/powers",
     "materials/uniform",
     "path/class",
     "path/state",

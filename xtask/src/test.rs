@@ -29,7 +29,8 @@ const LONG_FORMS: &str = "GPU_TRACE_TEST_ALL";
 /// studies, to which a GPU is one like another; and those of light transport, whose formulas are asked
 /// on every driver by the others, one by one (`functions`, `materials`, `check`) and in whole images
 /// (`agreement`, `hazards`). All other files of `tests/` run on every driver.
-const ONCE: [&str; 29] = [
+const ONCE: [&str; 31] = [
+    "albedo_variance",
     "claims",
     "cli",
     "cli_commands",
@@ -49,6 +50,7 @@ const ONCE: [&str; 29] = [
     "input",
     "job",
     "ledger",
+    "material_keys",
     "naive",
     "output",
     "particles",

@@ -38,6 +38,10 @@ fn f_cos(e: &Evaluated) -> DVec3 {
     DVec3::from(e.f_cos.map(f64::from))
 }
 
+/// Values below this may be 0, or have lost digits: a few of f32's smallest normal number, which drivers may keep or
+/// not.
+const LEAST: f64 = 1.0e-36;
+
 /// weight = f cos/pdf, the pdf and the event are the same, asked by `sample` and by `evaluate`, for materials
 /// that are no delta lobes. `factor` on the weight, for companions.
 ///
@@ -71,6 +75,10 @@ pub fn weights(
         let Some([by_value, by_pdf]) = allowance(subjects, input, i) else {
             continue;
         };
+        let sampled = f64::from(s.pdf) * s.weight();
+        if f_cos(e).max(sampled).max_element() < LEAST {
+            continue;
+        }
         let place = || format!("{input:?}: {s:?}, {e:?}");
         let (weight, pdf) = (factor * s.weight(), f64::from(s.pdf));
         let size = f_cos(e).max_element();
@@ -115,6 +123,11 @@ pub fn reciprocity(
         let [Some([one, _]), Some([other, _])] = allowed else {
             continue;
         };
+        // Both cosines are above 1e-4. Of a material that sends nothing there, 0 both ways counts.
+        let sizes = [a, b].map(|e| f_cos(e).max_element());
+        if sizes.iter().all(|size| *size < 1.0e4 * LEAST) && sizes != [0.0; 2] {
+            continue;
+        }
         let [cos_i, cos_o] = [there, back].map(cosine);
         let (f, g) = (f_cos(a) / cos_i, factor * f_cos(b) / cos_o);
         // The cosines here are those of the f32 numbers.
