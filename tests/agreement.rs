@@ -105,6 +105,7 @@ fn other_kernels_agree_with_the_reference() {
         "lecture-reflective",
         "tests/glass-ball",
         "tests/nested",
+        "tests/rough-glass",
     ];
     check(names.into_iter().flat_map(|name| {
         let scene = scene_file(format!("scenes/{name}.toml"));

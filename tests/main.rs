@@ -46,6 +46,7 @@ mod price;
 mod projected;
 mod references;
 mod reflective;
+mod rough_glass;
 mod samplers;
 mod scene;
 mod sobol;

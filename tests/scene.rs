@@ -105,7 +105,7 @@ fn the_good_scene_is_read_as_written() {
     assert_eq!(names, ["white", "glass", "shiny"], "in file order");
     assert_eq!(
         scene.materials[1].kind,
-        MaterialKind::from(Dielectric { ior: 1.5 })
+        MaterialKind::from(Dielectric::smooth(1.5))
     );
     assert_eq!(scene.materials[0].emission, DVec3::splat(2.0));
     assert_eq!(scene.spheres[1].priority, Some(2));

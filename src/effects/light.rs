@@ -60,6 +60,7 @@ pub(super) fn rows() -> Vec<Row> {
             "lighting",
             "LIGHT_COUNT",
             "is_delta",
+            "both_sides",
         ]),
         Row::new(
             Effect::Projected,
@@ -94,7 +95,7 @@ pub(super) fn rows() -> Vec<Row> {
             },
         )
         .needs([Effect::Lights])
-        .marks(["light_from_table", "cone_height"]),
+        .marks(["light_from_table"]),
         Row::new(
             Effect::Mis,
             "mis",

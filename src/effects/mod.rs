@@ -342,6 +342,12 @@ impl Effects {
         self.has(Effect::Lights) && !self.has(Effect::Table)
     }
 
+    /// Whether light sampling looks for lamps on both sides of a surface.
+    #[must_use]
+    pub fn looks_through(&self) -> bool {
+        self.has(Effect::Lights) && self.forms().any(|(_, form)| form.is_translucent())
+    }
+
     /// Name and state of every flag that the kernel's sources may ask for: effects, and what follows from
     /// them.
     pub fn flags(&self) -> impl Iterator<Item = (&'static str, bool)> {
@@ -353,6 +359,7 @@ impl Effects {
             ("transmits", self.transmits()),
             ("relative", self.looks_at_index()),
             ("weighed", self.weighs_lights()),
+            ("through", self.looks_through()),
         ])
     }
 

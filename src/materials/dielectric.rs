@@ -1,32 +1,61 @@
-//! Smooth glass; twin of `shaders/materials/dielectric.wesl`.
+//! Glass, smooth or rough; twin of `shaders/materials/dielectric.wesl`.
+
+mod rough;
 
 use glam::DVec3;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
+use super::ggx::alpha;
 use super::schema::MAX_MAGNITUDE;
 use super::{Bsdf, BsdfSample, BsdfValue, Event, Form, Member, MemberValue, Surface, Value};
 
 pub(super) const NAME: &str = "dielectric";
 
-pub(super) const FORMS: &[Form] = &[Form {
-    what: "smooth glass: Fresnel reflection and refraction",
-    delta: true,
-    transmits: true,
-    members: &[Member::scalar("ior")],
-    ..Form::of(NAME)
-}];
+pub(super) const FORMS: &[Form] = &[
+    Form {
+        what: "smooth glass: Fresnel reflection and refraction",
+        delta: true,
+        transmits: true,
+        members: &[Member::scalar("ior")],
+        ..Form::of(NAME)
+    },
+    Form {
+        name: "rough_dielectric",
+        what: "rough glass: the same about GGX microfacets",
+        transmits: true,
+        members: &[Member::scalar("ior"), Member::scalar("alpha")],
+        ..Form::of(NAME)
+    },
+];
 
-/// Smooth glass.
+/// Glass, smooth or rough.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 pub struct Dielectric {
     /// Absolute refractive index (vacuum 1).
     #[schemars(range(max = MAX_MAGNITUDE), extend("exclusiveMinimum" = 0.0))]
     pub ior: f64,
+    /// 0 is smooth; the square of it is the GGX alpha.
+    #[serde(default)]
+    #[schemars(range(min = 0.0, max = 1.0), extend("default" = 0.0))]
+    pub roughness: f64,
 }
 
 pub(super) fn cases() -> Vec<Dielectric> {
-    [1.5, 1.0, 2.4].map(|ior| Dielectric { ior }).into()
+    let smooth = [1.5, 1.0, 2.4].map(Dielectric::smooth);
+    // The narrowest lobes, wide ones, and an index next to 1.
+    let rough = [
+        (1.5, 0.03),
+        (1.33, 0.2),
+        (1.01, 0.4),
+        (1.5, 0.6),
+        (2.4, 1.0),
+    ];
+    let rough = rough.map(|(ior, roughness)| Dielectric {
+        roughness,
+        ..Dielectric::smooth(ior)
+    });
+    [&smooth[..], &rough].concat()
 }
 
 /// Fresnel's answer for one direction.
@@ -57,17 +86,40 @@ pub fn fresnel(cos_i: f64, eta: f64) -> Fresnel {
     }
 }
 
-impl Bsdf for Dielectric {
-    fn form(&self) -> &'static Form {
-        &FORMS[0]
+impl Dielectric {
+    /// Smooth glass.
+    #[must_use]
+    pub const fn smooth(ior: f64) -> Self {
+        Self {
+            ior,
+            roughness: 0.0,
+        }
     }
 
+    fn alpha(&self) -> f64 {
+        alpha(self.roughness, 0.0).x
+    }
+}
+
+impl Bsdf for Dielectric {
+    fn form(&self) -> &'static Form {
+        &FORMS[usize::from(self.roughness > 0.0)]
+    }
+
+    // What is not given does not count: scenes of before keep their hash.
     fn parameters(&self) -> Vec<(&'static str, Value)> {
-        vec![("ior", Value::Number(self.ior))]
+        let mut parameters = vec![("ior", Value::Number(self.ior))];
+        if self.roughness > 0.0 {
+            parameters.push(("roughness", Value::Number(self.roughness)));
+        }
+        parameters
     }
 
     fn members(&self) -> Vec<MemberValue> {
-        vec![self.ior.into()]
+        if self.roughness == 0.0 {
+            return vec![self.ior.into()];
+        }
+        vec![self.ior.into(), self.alpha().into()]
     }
 
     fn color(&self) -> DVec3 {
@@ -78,12 +130,16 @@ impl Bsdf for Dielectric {
         DVec3::ONE
     }
 
+    // The weight is at most 1, G2/G1 where it is rough.
     fn moment(&self, _: usize, _: i32) -> f64 {
         1.0
     }
 
     // Chooses a lobe with its share of the light; radiance is scaled by 1/eta^2 on refraction.
     fn sample(&self, surface: &Surface, wo: DVec3, u: [f64; 4]) -> BsdfSample {
+        if self.roughness > 0.0 {
+            return rough::sample(self.alpha(), surface, wo, u);
+        }
         let (normal, eta) = (surface.normal, surface.eta);
         let cos_i = normal.dot(wo).clamp(0.0, 1.0);
         let f = fresnel(cos_i, eta);
@@ -105,8 +161,12 @@ impl Bsdf for Dielectric {
         }
     }
 
-    fn evaluate(&self, _: &Surface, _: DVec3, _: DVec3) -> BsdfValue {
-        BsdfValue::NONE
+    fn evaluate(&self, surface: &Surface, wo: DVec3, wi: DVec3) -> BsdfValue {
+        if self.roughness > 0.0 {
+            rough::evaluate(self.alpha(), surface, wo, wi)
+        } else {
+            BsdfValue::NONE
+        }
     }
 
     fn ior(&self) -> f64 {

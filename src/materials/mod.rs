@@ -198,12 +198,22 @@ impl MaterialKind {
     pub fn is_delta(&self) -> bool {
         self.form().delta
     }
+
+    /// Whether it scatters light through the surface.
+    #[must_use]
+    pub fn is_translucent(&self) -> bool {
+        self.form().is_translucent()
+    }
 }
 
 /// All forms of all materials; the place of one is its code in the kernel.
 pub fn forms() -> &'static [&'static Form] {
-    static FORMS: LazyLock<Vec<&'static Form>> =
-        LazyLock::new(|| ALL.iter().flat_map(|material| material.forms).collect());
+    static FORMS: LazyLock<Vec<&'static Form>> = LazyLock::new(|| {
+        let mut forms: Vec<&Form> = ALL.iter().flat_map(|material| material.forms).collect();
+        // Rough glass last: so the others keep the codes that they had before it, and kernels their text.
+        forms.sort_by_key(|form| form.is_translucent());
+        forms
+    });
     &FORMS
 }
 

@@ -131,7 +131,10 @@ impl PathTracer<'_> {
         let material = &self.scene.materials[sphere.material];
         let share = self.share_of_emission(&path.ray, &hit, path.departure);
         path.receive(path.class, path.throughput * share * material.emission);
-        let vertex = vertex_at(&path.ray, &hit, sphere);
+        let vertex = Vertex {
+            both_sides: material.kind.is_translucent(),
+            ..vertex_at(&path.ray, &hit, sphere)
+        };
         if path.found.bounces == 0 {
             self.see(path, &hit, &vertex, material);
         }
@@ -175,7 +178,8 @@ impl PathTracer<'_> {
         aovs.hits = 1.0;
     }
 
-    /// Lets the material choose a direction; by the lecture's integrator it is uniform but for delta lobes.
+    /// Lets the material choose a direction; by the lecture's integrator it is uniform where it is
+    /// [hemispherical](crate::materials::Form::is_hemispherical).
     fn sample(
         &self,
         material: &MaterialKind,
@@ -184,7 +188,7 @@ impl PathTracer<'_> {
         u: [f64; 4],
     ) -> BsdfSample {
         match self.settings.integrator {
-            Integrator::Lecture { .. } if !material.is_delta() => {
+            Integrator::Lecture { .. } if material.form().is_hemispherical() => {
                 sample_uniform(&**material, surface, wo, u)
             }
             _ => material.sample(surface, wo, u),
@@ -195,7 +199,9 @@ impl PathTracer<'_> {
     fn go_on(&self, path: &mut Path, hit: &Hit, vertex: &Vertex, s: &BsdfSample, u: f64) -> bool {
         path.class = next_class(path.class, s.event);
         path.departure.pdf = s.pdf;
-        path.departure.pdf_per_weight *= vertex.normal.dot(s.wi).max(0.0);
+        if !vertex.both_sides {
+            path.departure.pdf_per_weight *= vertex.normal.dot(s.wi).max(0.0);
+        }
         path.throughput *= s.weight;
         path.eta_scale *= s.eta * s.eta;
         let largest = (path.throughput * path.eta_scale).max_element();
@@ -212,16 +218,21 @@ impl PathTracer<'_> {
         let arrived = path.ray.clone();
         path.ray = leave(arrived, hit, vertex, s.wi, crossed, self.placement.offset);
         if crossed {
-            let sphere = &self.placement.spheres[hit.index];
-            let medium = Medium {
-                level: sphere.level,
-                ior: self.scene.materials[sphere.material].kind.ior(),
-                sphere: hit.index,
-            };
-            cross_surface(&mut path.ray.media, medium, hit.inside);
+            self.cross(&mut path.ray, hit);
         }
         path.found.bounces += 1;
         true
+    }
+
+    /// Changes the media of a ray that has crossed the surface.
+    fn cross(&self, ray: &mut Ray, hit: &Hit) {
+        let sphere = &self.placement.spheres[hit.index];
+        let medium = Medium {
+            level: sphere.level,
+            ior: self.scene.materials[sphere.material].kind.ior(),
+            sphere: hit.index,
+        };
+        cross_surface(&mut ray.media, medium, hit.inside);
     }
 }
 
@@ -278,7 +289,12 @@ impl PathTracer<'_> {
         if s.pdf <= 0.0 || f.pdf <= 0.0 {
             return direct;
         }
-        let shadow = leave(ray.clone(), hit, vertex, s.wi, false, self.placement.offset);
+        let crossed = f.event.is(Event::TRANSMITTED);
+        let offset = self.placement.offset;
+        let mut shadow = leave(ray.clone(), hit, vertex, s.wi, crossed, offset);
+        if crossed {
+            self.cross(&mut shadow, hit);
+        }
         // A ray that misses the limb by a rounding has seen the lamp all the same; lamps are sampled
         // from outside.
         let hidden = closest_hit(&shadow, spheres).is_some_and(|first| {
