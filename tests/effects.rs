@@ -118,13 +118,18 @@ fn of_form(code: u32) -> MaterialKind {
 /// A scene and settings that ask for exactly the effects of `set`, where that is possible.
 fn asking_for(set: &Set) -> (Scene, Settings) {
     let has = |effect| set.contains(&effect);
-    let kinds: Vec<MaterialKind> = set
+    let mut kinds: Vec<MaterialKind> = set
         .iter()
         .filter_map(|effect| match effect {
             Effect::Form(code) => Some(of_form(*code)),
             _ => None,
         })
         .collect();
+    for kind in &mut kinds {
+        if let (MaterialKind::Dielectric(glass), true) = (kind, has(Effect::Absorption)) {
+            glass.absorption = DVec3::new(0.0, 0.1, 0.2);
+        }
+    }
     let material = |(i, kind): (usize, &MaterialKind)| Material {
         name: format!("m{i}"),
         kind: kind.clone(),

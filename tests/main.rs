@@ -7,6 +7,7 @@ mod common;
 mod equivalence;
 mod thorough;
 
+mod absorption;
 mod adaptive;
 mod agreement;
 mod aov;

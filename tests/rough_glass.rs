@@ -1,5 +1,5 @@
-//! Rough glass in scenes: all estimators have the same mean, lamps on any side of it and in it, and where there is
-//! no surface there is none to be seen. (Its BSDF is tested as that of every material is.)
+//! Rough glass in scenes: all estimators have the same mean, lamps on any side of it and in it, clear or tinted, and
+//! where there is no surface there is none to be seen. (Its BSDF is tested as that of every material is.)
 
 use crate::common::{render_gpu, scene};
 use gpu_trace::film::Film;
@@ -15,6 +15,7 @@ fn scene_with(eye: [f64; 3], spheres: &[(&str, [f64; 3], f64)]) -> Scene {
          [environment]\nradiance = [0.1, 0.1, 0.1]\n\
          [material.frosted]\ntype = \"dielectric\"\nior = 1.5\nroughness = 0.6\n\
          [material.dense]\ntype = \"dielectric\"\nior = 1.8\nroughness = 0.5\n\
+         [material.tinted]\ntype = \"dielectric\"\nior = 1.5\nroughness = 0.6\nabsorption = [0.7, 0, 0]\n\
          [material.clear]\ntype = \"dielectric\"\nior = 1.3\n\
          [material.floor]\ntype = \"diffuse\"\nalbedo = [0.5, 0.5, 0.5]\n\
          [material.lamp]\ntype = \"diffuse\"\nalbedo = [0, 0, 0]\nemission = [4, 4, 4]\n\
@@ -74,6 +75,18 @@ fn situations() -> Vec<(&'static str, Scene)> {
             ),
         ),
         ("many lamps", scene_with(OUTSIDE, &many)),
+        (
+            "tinted",
+            scene_with(
+                OUTSIDE,
+                &[
+                    ("tinted", [0.0, 0.0, 0.0], 1.0),
+                    ("clear", [0.6, 0.3, 0.2], 0.5),
+                    ("lamp", [-0.2, 0.1, 0.1], 0.3),
+                    ("floor", [0.2, -0.5, 0.1], 0.3),
+                ],
+            ),
+        ),
     ]
 }
 

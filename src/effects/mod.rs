@@ -60,6 +60,8 @@ pub enum Effect {
     Form(u32),
     /// Dielectrics that share points.
     Priority,
+    /// Light that dielectrics absorb.
+    Absorption,
     /// Surfaces that emit.
     Emission,
     /// A constant environment.

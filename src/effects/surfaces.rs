@@ -1,5 +1,7 @@
 //! Effects of what surfaces are made of.
 
+use glam::DVec3;
+
 use super::{Effect, Row};
 use crate::materials::{Form, forms};
 
@@ -44,5 +46,13 @@ pub(super) fn rows() -> Vec<Row> {
         "Media::sphere",
         "Attributes::level",
     ]);
-    materials.chain([priority]).collect()
+    let absorption = Row::new(
+        Effect::Absorption,
+        "absorption",
+        "light that dielectrics absorb on its way through them",
+        |asked| asked.surfaces(|material| material.kind.absorption() != DVec3::ZERO),
+    )
+    .needs(forms_that(|form| form.transmits))
+    .marks(["absorption", "absorption_within", "absorb"]);
+    materials.chain([priority, absorption]).collect()
 }

@@ -242,6 +242,16 @@ pub struct CountersRecord {
     pub advanced: u32,
 }
 
+/// What a material's inner side absorbs per unit length of the kernel. Below the normal numbers of f32 it is the least
+/// of these, which is as good as nothing on any way that is not infinite.
+fn absorption(material: &Material, length: f64) -> [f32; 3] {
+    let rounded = |x: f64| match x {
+        0.0 => 0.0,
+        x => ((x / length) as f32).max(f32::MIN_POSITIVE),
+    };
+    material.kind.absorption().to_array().map(rounded)
+}
+
 /// What a kernel may want to know of a material, rounded to f32.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MaterialRecord {
@@ -249,12 +259,12 @@ pub struct MaterialRecord {
 }
 
 impl MaterialRecord {
-    /// The record of `material`, emission times `light`.
+    /// The record of `material`, emission times `light`, for lengths that are multiplied by `length`.
     ///
     /// # Panics
     /// If the form of the material is not in the list of all forms.
     #[must_use]
-    pub fn new(material: &Material, light: f64) -> Self {
+    pub fn new(material: &Material, light: f64, length: f64) -> Self {
         let form = material.kind.form();
         let code = forms().iter().position(|f| *f == form);
         let code = code.expect("every material is in the list");
@@ -264,6 +274,10 @@ impl MaterialRecord {
             (
                 Member::vector("emission"),
                 (material.emission * light).into(),
+            ),
+            (
+                Member::vector("absorption"),
+                MemberValue::Vector(absorption(material, length)),
             ),
         ];
         let own = form.members.iter().copied().zip(material.kind.members());

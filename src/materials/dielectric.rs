@@ -8,7 +8,9 @@ use serde::Deserialize;
 
 use super::ggx::alpha;
 use super::schema::MAX_MAGNITUDE;
-use super::{Bsdf, BsdfSample, BsdfValue, Event, Form, Member, MemberValue, Surface, Value};
+use super::{
+    Bsdf, BsdfSample, BsdfValue, Event, Form, Member, MemberValue, Surface, Value, schema,
+};
 
 pub(super) const NAME: &str = "dielectric";
 
@@ -39,10 +41,18 @@ pub struct Dielectric {
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 1.0), extend("default" = 0.0))]
     pub roughness: f64,
+    /// What is absorbed of light inside, per unit length and channel.
+    #[serde(default)]
+    #[schemars(schema_with = "schema::absorption")]
+    pub absorption: DVec3,
 }
 
 pub(super) fn cases() -> Vec<Dielectric> {
     let smooth = [1.5, 1.0, 2.4].map(Dielectric::smooth);
+    let tinted = Dielectric {
+        absorption: DVec3::new(0.1, 0.0, 2.0),
+        ..Dielectric::smooth(1.5)
+    };
     // The narrowest lobes, wide ones, and an index next to 1.
     let rough = [
         (1.5, 0.03),
@@ -55,7 +65,7 @@ pub(super) fn cases() -> Vec<Dielectric> {
         roughness,
         ..Dielectric::smooth(ior)
     });
-    [&smooth[..], &rough].concat()
+    [&smooth[..], &[tinted], &rough].concat()
 }
 
 /// Fresnel's answer for one direction.
@@ -93,6 +103,7 @@ impl Dielectric {
         Self {
             ior,
             roughness: 0.0,
+            absorption: DVec3::ZERO,
         }
     }
 
@@ -111,6 +122,9 @@ impl Bsdf for Dielectric {
         let mut parameters = vec![("ior", Value::Number(self.ior))];
         if self.roughness > 0.0 {
             parameters.push(("roughness", Value::Number(self.roughness)));
+        }
+        if self.absorption != DVec3::ZERO {
+            parameters.push(("absorption", Value::Vector(self.absorption)));
         }
         parameters
     }
@@ -171,5 +185,9 @@ impl Bsdf for Dielectric {
 
     fn ior(&self) -> f64 {
         self.ior
+    }
+
+    fn absorption(&self) -> DVec3 {
+        self.absorption
     }
 }

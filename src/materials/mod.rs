@@ -55,6 +55,11 @@ pub trait Bsdf {
         1.0
     }
 
+    /// What is absorbed of light on its inner side, per unit length of the scene, by channel.
+    fn absorption(&self) -> DVec3 {
+        DVec3::ZERO
+    }
+
     /// What is wrong with its parameters together.
     fn mistake(&self) -> Option<Mistake> {
         None

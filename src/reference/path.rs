@@ -8,8 +8,9 @@ use super::light::aim::aim_at;
 use super::light::environment_radiance;
 use super::light::sphere::{light_pdf, mis_weight, sample_light};
 use super::purpose::{CAMERA, lighting, scattering};
+use super::scene::absorption::transmittance;
 use super::scene::camera::camera_ray;
-use super::scene::priority::{cross_surface, index_within, relative_index};
+use super::scene::priority::{Media, cross_surface, filling, index_within, relative_index};
 use super::scene::ray::{Hit, Ray, Vertex, leave, vertex_at};
 use super::scene::sphere::closest_hit;
 use crate::film::{AovSums, LightClass};
@@ -122,7 +123,9 @@ impl PathTracer<'_> {
     /// does.
     fn extend(&self, path: &mut Path, random: &dyn Fn(u32) -> [f64; 4]) -> bool {
         path.found.rays += 1;
-        let Some(hit) = closest_hit(&path.ray, &self.placement.spheres) else {
+        let hit = closest_hit(&path.ray, &self.placement.spheres);
+        path.throughput *= self.transmittance(&path.ray.media, hit.map(|hit| hit.t));
+        let Some(hit) = hit else {
             let sky = environment_radiance(self.scene);
             path.receive(path.class, path.throughput * sky);
             return false;
@@ -165,6 +168,16 @@ impl PathTracer<'_> {
         }
         let s = self.sample(&material.kind, &surface, wo, u);
         self.go_on(path, &hit, &vertex, &s, u[3])
+    }
+
+    /// What is left of light after a length `t` in what fills the space, `None` for infinitely far.
+    fn transmittance(&self, media: &Media, t: Option<f64>) -> DVec3 {
+        let Some(medium) = filling(media) else {
+            return DVec3::ONE;
+        };
+        let sphere = &self.placement.spheres[medium.sphere];
+        let absorption = self.scene.materials[sphere.material].kind.absorption();
+        transmittance(absorption / self.placement.scale, t)
     }
 
     /// Takes note of what is seen first.
@@ -297,7 +310,8 @@ impl PathTracer<'_> {
         }
         // A ray that misses the limb by a rounding has seen the lamp all the same; lamps are sampled
         // from outside.
-        let hidden = closest_hit(&shadow, spheres).is_some_and(|first| {
+        let first = closest_hit(&shadow, spheres);
+        let hidden = first.is_some_and(|first| {
             if first.index == s.sphere {
                 first.inside
             } else {
@@ -313,6 +327,9 @@ impl PathTracer<'_> {
             _ => 1.0,
         };
         direct.radiance = share / s.pdf * f.f_cos * material(s.sphere).emission;
+        let length = first.filter(|first| first.index == s.sphere);
+        let length = length.map_or(s.limb, |first| first.t);
+        direct.radiance *= self.transmittance(&shadow.media, Some(length));
         direct
     }
 }

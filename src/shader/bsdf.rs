@@ -17,6 +17,9 @@ pub fn members(effects: &Effects) -> Vec<Member> {
     if effects.has(Effect::Emission) {
         own.push(Member::vector("emission"));
     }
+    if effects.has(Effect::Absorption) {
+        own.push(Member::vector("absorption"));
+    }
     for (_, form) in effects.forms() {
         for member in form.members {
             if !own.contains(member) {

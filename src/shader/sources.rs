@@ -37,6 +37,7 @@ sources![
     "sampler/independent",
     "sampler/purpose",
     "sampler/sobol",
+    "scene/absorption",
     "scene/attributes",
     "scene/bvh",
     "scene/camera",
