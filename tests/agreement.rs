@@ -134,7 +134,7 @@ fn perturbed(scene: &Scene, factor: f64) -> Scene {
         match &mut material.kind {
             MaterialKind::Diffuse(m) => m.albedo *= factor,
             MaterialKind::Mirror(m) => m.reflectance *= factor,
-            MaterialKind::Dielectric(m) => m.ior = 1.0 + factor * (m.ior - 1.0),
+            MaterialKind::Dielectric(m) => m.ior = m.ior.map(|ior| 1.0 + factor * (ior - 1.0)),
             MaterialKind::Reflective(m) => m.albedo *= factor,
             MaterialKind::Conductor(m) => m.k = m.k.map(|k| factor * k),
         }

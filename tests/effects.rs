@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex};
 
 use crate::common::{scene_file, scene_files};
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use gpu_trace::effects::{Effect, Effects, table};
 use gpu_trace::materials::{ALL, MaterialKind, forms};
 use gpu_trace::placement::Placement;
@@ -126,8 +126,15 @@ fn asking_for(set: &Set) -> (Scene, Settings) {
         })
         .collect();
     for kind in &mut kinds {
-        if let (MaterialKind::Dielectric(glass), true) = (kind, has(Effect::Absorption)) {
+        let MaterialKind::Dielectric(glass) = kind else {
+            continue;
+        };
+        if has(Effect::Absorption) {
             glass.absorption = DVec3::new(0.0, 0.1, 0.2);
+        }
+        if has(Effect::Dispersion) {
+            glass.ior = None;
+            glass.cauchy = Some(DVec2::new(1.5, 0.01));
         }
     }
     let material = |(i, kind): (usize, &MaterialKind)| Material {

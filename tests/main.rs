@@ -23,6 +23,7 @@ mod containment;
 mod converge;
 mod coverage;
 mod determinism;
+mod dispersion;
 mod distribution;
 mod effects;
 mod faults;

@@ -62,6 +62,8 @@ pub enum Effect {
     Priority,
     /// Light that dielectrics absorb.
     Absorption,
+    /// Refractive indices by the wavelength.
+    Dispersion,
     /// Surfaces that emit.
     Emission,
     /// A constant environment.

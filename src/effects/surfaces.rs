@@ -54,5 +54,23 @@ pub(super) fn rows() -> Vec<Row> {
     )
     .needs(forms_that(|form| form.transmits))
     .marks(["absorption", "absorption_within", "absorb"]);
-    materials.chain([priority, absorption]).collect()
+    let dispersion = Row::new(
+        Effect::Dispersion,
+        "dispersion",
+        "refractive indices by the wavelength, of which a path keeps one",
+        |asked| asked.surfaces(|material| material.kind.dispersion().is_some()),
+    )
+    .needs(forms_that(|form| form.transmits))
+    .marks([
+        "spectrum",
+        "dispersion",
+        "wavelength",
+        "WAVELENGTH",
+        "INITIAL_DISPERSIVE",
+        "keep_wavelength",
+        "Path::spectral",
+    ]);
+    materials
+        .chain([priority, absorption, dispersion])
+        .collect()
 }

@@ -9,6 +9,7 @@ use glam::DVec3;
 
 use crate::effects::{Effect, Effects};
 use crate::film::{TILE, Tiles};
+use crate::materials::dielectric::Index;
 use crate::materials::{Member, MemberValue, forms};
 use crate::placement::{Light, PlacedCamera, PlacedSphere, Placement};
 use crate::scene::Material;
@@ -252,6 +253,23 @@ fn absorption(material: &Material, length: f64) -> [f32; 3] {
     material.kind.absorption().to_array().map(rounded)
 }
 
+/// What says how a material's index depends on the wavelength: 0 where it does not.
+fn dispersion(material: &Material) -> [(Member, MemberValue); 3] {
+    let (cauchy, terms) = match material.kind.dispersion() {
+        Some(Index::Cauchy(terms)) => (terms.y, None),
+        Some(Index::Sellmeier(terms)) => (0.0, Some(terms)),
+        Some(Index::Constant(_)) | None => (0.0, None),
+    };
+    let [b, c] = terms.map_or([DVec3::ZERO; 2], |terms| [terms.b, terms.c]);
+    // A term of no strength is none, wherever its resonance is.
+    let c = DVec3::select(b.cmpeq(DVec3::ZERO), DVec3::ZERO, c);
+    [
+        (Member::scalar("cauchy"), cauchy.into()),
+        (Member::vector("sellmeier_b"), b.into()),
+        (Member::vector("sellmeier_c"), c.into()),
+    ]
+}
+
 /// What a kernel may want to know of a material, rounded to f32.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MaterialRecord {
@@ -281,8 +299,9 @@ impl MaterialRecord {
             ),
         ];
         let own = form.members.iter().copied().zip(material.kind.members());
+        let common = common.into_iter().chain(dispersion(material));
         Self {
-            values: common.into_iter().chain(own).collect(),
+            values: common.chain(own).collect(),
         }
     }
 

@@ -1,15 +1,18 @@
 //! Glass, smooth or rough; twin of `shaders/materials/dielectric.wesl`.
 
+mod index;
 mod rough;
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use schemars::JsonSchema;
 use serde::Deserialize;
+
+pub use index::{Glass, Index, Sellmeier};
 
 use super::ggx::alpha;
 use super::schema::MAX_MAGNITUDE;
 use super::{
-    Bsdf, BsdfSample, BsdfValue, Event, Form, Member, MemberValue, Surface, Value, schema,
+    Bsdf, BsdfSample, BsdfValue, Event, Form, Member, MemberValue, Mistake, Surface, Value, schema,
 };
 
 pub(super) const NAME: &str = "dielectric";
@@ -34,9 +37,22 @@ pub(super) const FORMS: &[Form] = &[
 /// Glass, smooth or rough.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 pub struct Dielectric {
-    /// Absolute refractive index (vacuum 1).
-    #[schemars(range(max = MAX_MAGNITUDE), extend("exclusiveMinimum" = 0.0))]
-    pub ior: f64,
+    /// Absolute refractive index (vacuum 1), of all light.
+    #[serde(default)]
+    #[schemars(with = "f64", range(max = MAX_MAGNITUDE), extend("exclusiveMinimum" = 0.0))]
+    pub ior: Option<f64>,
+    /// The index of a medium, in the place of `ior`.
+    #[serde(default)]
+    #[schemars(with = "Glass")]
+    pub preset: Option<Glass>,
+    /// A and B of the index A + B/l², l the wavelength in micrometres, in the place of `ior`.
+    #[serde(default)]
+    #[schemars(schema_with = "index::cauchy")]
+    pub cauchy: Option<DVec2>,
+    /// Sellmeier's terms of the index, in the place of `ior`.
+    #[serde(default)]
+    #[schemars(with = "Sellmeier")]
+    pub sellmeier: Option<Sellmeier>,
     /// 0 is smooth; the square of it is the GGX alpha.
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 1.0), extend("default" = 0.0))]
@@ -65,7 +81,18 @@ pub(super) fn cases() -> Vec<Dielectric> {
         roughness,
         ..Dielectric::smooth(ior)
     });
-    [&smooth[..], &[tinted], &rough].concat()
+    let dispersive = Dielectric {
+        ior: None,
+        preset: Some(Glass::BK7),
+        ..Dielectric::smooth(1.5)
+    };
+    let cauchy = Dielectric {
+        ior: None,
+        cauchy: Some(DVec2::new(1.4, 0.01)),
+        roughness: 0.5,
+        ..Dielectric::smooth(1.5)
+    };
+    [&smooth[..], &[tinted, dispersive], &rough, &[cauchy]].concat()
 }
 
 /// Fresnel's answer for one direction.
@@ -101,10 +128,25 @@ impl Dielectric {
     #[must_use]
     pub const fn smooth(ior: f64) -> Self {
         Self {
-            ior,
+            ior: Some(ior),
+            preset: None,
+            cauchy: None,
+            sellmeier: None,
             roughness: 0.0,
             absorption: DVec3::ZERO,
         }
+    }
+
+    /// Of the keys that give it the first counts.
+    fn index(&self) -> Index {
+        let given = [
+            self.ior.map(Index::Constant),
+            self.preset.map(Glass::index),
+            self.cauchy.map(Index::Cauchy),
+            self.sellmeier.map(Index::Sellmeier),
+        ];
+        let mut given = given.into_iter().flatten();
+        given.next().unwrap_or(Index::Constant(1.0))
     }
 
     fn alpha(&self) -> f64 {
@@ -119,7 +161,7 @@ impl Bsdf for Dielectric {
 
     // What is not given does not count: scenes of before keep their hash.
     fn parameters(&self) -> Vec<(&'static str, Value)> {
-        let mut parameters = vec![("ior", Value::Number(self.ior))];
+        let mut parameters = vec![self.index().parameter()];
         if self.roughness > 0.0 {
             parameters.push(("roughness", Value::Number(self.roughness)));
         }
@@ -129,11 +171,36 @@ impl Bsdf for Dielectric {
         parameters
     }
 
+    fn mistake(&self) -> Option<Mistake> {
+        let given = [
+            ("ior", self.ior.is_some()),
+            ("preset", self.preset.is_some()),
+            ("cauchy", self.cauchy.is_some()),
+            ("sellmeier", self.sellmeier.is_some()),
+        ];
+        let keys: Vec<_> = given.iter().filter(|(_, given)| *given).collect();
+        let (key, what) = match keys[..] {
+            [] => ("type", "a dielectric needs its index"),
+            [_] => return self.index().mistake(),
+            [_, (key, _), ..] => (*key, "the index is given more than once"),
+        };
+        Some(Mistake {
+            key,
+            what,
+            help: "give one of `ior`, `preset`, `cauchy` and `sellmeier`",
+        })
+    }
+
+    // Of Cauchy's index it is A.
     fn members(&self) -> Vec<MemberValue> {
+        let ior = match self.index() {
+            Index::Cauchy(terms) => terms.x,
+            index => index.named(),
+        };
         if self.roughness == 0.0 {
-            return vec![self.ior.into()];
+            return vec![ior.into()];
         }
-        vec![self.ior.into(), self.alpha().into()]
+        vec![ior.into(), self.alpha().into()]
     }
 
     fn color(&self) -> DVec3 {
@@ -184,7 +251,11 @@ impl Bsdf for Dielectric {
     }
 
     fn ior(&self) -> f64 {
-        self.ior
+        self.index().named()
+    }
+
+    fn dispersion(&self) -> Option<Index> {
+        Some(self.index()).filter(Index::is_dispersive)
     }
 
     fn absorption(&self) -> DVec3 {

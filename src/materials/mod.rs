@@ -14,9 +14,11 @@ mod uniform;
 use std::ops::Deref;
 use std::sync::LazyLock;
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::Deserialize;
+
+use dielectric::Index;
 
 pub use contract::{BsdfSample, BsdfValue, Event, Surface};
 pub use form::{Form, Member, MemberKind, MemberValue};
@@ -50,9 +52,14 @@ pub trait Bsdf {
     /// f cos of `wi` and the pdf with which [`sample`](Self::sample) finds it, without delta lobes.
     fn evaluate(&self, surface: &Surface, wo: DVec3, wi: DVec3) -> BsdfValue;
 
-    /// Absolute refractive index of the inner side; 1 where paths do not cross the surface.
+    /// Absolute refractive index of the inner side, in a word; 1 where paths do not cross the surface.
     fn ior(&self) -> f64 {
         1.0
+    }
+
+    /// The index by the wavelength, where it depends on it.
+    fn dispersion(&self) -> Option<Index> {
+        None
     }
 
     /// What is absorbed of light on its inner side, per unit length of the scene, by channel.
@@ -89,6 +96,15 @@ pub enum Value {
     Number(f64),
     /// A colour or a vector.
     Vector(DVec3),
+    /// Two numbers.
+    Pair(DVec2),
+    /// Sellmeier's terms.
+    Terms {
+        /// Strengths.
+        b: DVec3,
+        /// Squares of wavelengths.
+        c: DVec3,
+    },
 }
 
 /// A type of materials.

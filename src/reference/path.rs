@@ -4,10 +4,11 @@ use glam::DVec3;
 
 use super::core::random::{random4, sample_key};
 use super::core::sobol::sobol4;
+use super::core::spectrum::sample_wavelength;
 use super::light::aim::aim_at;
 use super::light::environment_radiance;
 use super::light::sphere::{light_pdf, mis_weight, sample_light};
-use super::purpose::{CAMERA, lighting, scattering};
+use super::purpose::{CAMERA, WAVELENGTH, lighting, scattering};
 use super::scene::absorption::transmittance;
 use super::scene::camera::camera_ray;
 use super::scene::priority::{Media, cross_surface, filling, index_within, relative_index};
@@ -37,6 +38,14 @@ pub fn next_class(class: LightClass, event: Event) -> LightClass {
     }
 }
 
+/// The index of a material for a path that keeps a wavelength, or none.
+fn index_at(kind: &MaterialKind, wavelength: Option<f64>) -> f64 {
+    match (kind.dispersion(), wavelength) {
+        (Some(index), Some(wavelength)) => index.at(wavelength),
+        _ => kind.ior(),
+    }
+}
+
 /// What one path found.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PathResult {
@@ -58,6 +67,8 @@ struct Path {
     throughput: DVec3,
     /// Product of the index ratios squared of the refractions so far.
     eta_scale: f64,
+    /// That it keeps, in nm.
+    wavelength: Option<f64>,
     departure: Departure,
     class: LightClass,
     found: PathResult,
@@ -110,6 +121,7 @@ impl PathTracer<'_> {
             ray: camera_ray(&placement.camera, pixel, random(CAMERA), &placement.within),
             throughput: DVec3::ONE,
             eta_scale: 1.0,
+            wavelength: None,
             departure: Departure::default(),
             class: LightClass::Emission,
             found: PathResult::default(),
@@ -134,6 +146,7 @@ impl PathTracer<'_> {
         let material = &self.scene.materials[sphere.material];
         let share = self.share_of_emission(&path.ray, &hit, path.departure);
         path.receive(path.class, path.throughput * share * material.emission);
+        self.keep_wavelength(path, &material.kind, random);
         let vertex = Vertex {
             both_sides: material.kind.is_translucent(),
             ..vertex_at(&path.ray, &hit, sphere)
@@ -142,11 +155,12 @@ impl PathTracer<'_> {
             self.see(path, &hit, &vertex, material);
         }
         if path.found.bounces == self.settings.max_bounces {
-            path.found.cut = path.throughput;
+            path.found.cut = path.throughput.abs();
             return false;
         }
         let u = random(scattering(path.found.bounces));
-        let (media, ior) = (&path.ray.media, material.kind.ior());
+        let ior = index_at(&material.kind, path.wavelength);
+        let media = &path.ray.media;
         let surface = Surface {
             normal: vertex.normal,
             eta: if material.kind.transmits() {
@@ -158,7 +172,7 @@ impl PathTracer<'_> {
         let wo = -path.ray.direction;
         if self.samples_lights() {
             let v = random(lighting(path.found.bounces));
-            let direct = self.direct_light(&path.ray, &hit, &vertex, &surface, v);
+            let direct = self.direct_light(path, &hit, &vertex, &surface, v);
             let class = direct
                 .event
                 .map_or(path.class, |e| next_class(path.class, e));
@@ -175,8 +189,7 @@ impl PathTracer<'_> {
         let Some(medium) = filling(media) else {
             return DVec3::ONE;
         };
-        let sphere = &self.placement.spheres[medium.sphere];
-        let absorption = self.scene.materials[sphere.material].kind.absorption();
+        let absorption = self.kind_of(medium.sphere).absorption();
         transmittance(absorption / self.placement.scale, t)
     }
 
@@ -217,7 +230,7 @@ impl PathTracer<'_> {
         }
         path.throughput *= s.weight;
         path.eta_scale *= s.eta * s.eta;
-        let largest = (path.throughput * path.eta_scale).max_element();
+        let largest = (path.throughput.abs() * path.eta_scale).max_element();
         let survival = match self.settings.integrator {
             Integrator::Lecture { termination } => 1.0 - termination,
             _ if self.settings.roulette => roulette_survival(largest),
@@ -231,18 +244,43 @@ impl PathTracer<'_> {
         let arrived = path.ray.clone();
         path.ray = leave(arrived, hit, vertex, s.wi, crossed, self.placement.offset);
         if crossed {
-            self.cross(&mut path.ray, hit);
+            self.cross(&mut path.ray, hit, path.wavelength);
         }
         path.found.bounces += 1;
         true
     }
 
+    /// Keeps one wavelength from here on, if it does not yet and an index here depends on it. Paths begin without one
+    /// in dispersive media, too.
+    fn keep_wavelength(
+        &self,
+        path: &mut Path,
+        surface: &MaterialKind,
+        random: &dyn Fn(u32) -> [f64; 4],
+    ) {
+        let mut within = path.ray.media.iter().map(|m| self.kind_of(m.sphere));
+        let disperses = |kind: &MaterialKind| kind.dispersion().is_some();
+        if path.wavelength.is_some() || !(disperses(surface) || within.any(disperses)) {
+            return;
+        }
+        let spectral = sample_wavelength(random(WAVELENGTH)[1]);
+        path.throughput *= spectral.weight;
+        path.wavelength = Some(spectral.wavelength);
+        for medium in &mut path.ray.media {
+            medium.ior = index_at(self.kind_of(medium.sphere), path.wavelength);
+        }
+    }
+
+    /// The material of a sphere of the placement.
+    fn kind_of(&self, sphere: usize) -> &MaterialKind {
+        &self.scene.materials[self.placement.spheres[sphere].material].kind
+    }
+
     /// Changes the media of a ray that has crossed the surface.
-    fn cross(&self, ray: &mut Ray, hit: &Hit) {
-        let sphere = &self.placement.spheres[hit.index];
+    fn cross(&self, ray: &mut Ray, hit: &Hit, wavelength: Option<f64>) {
         let medium = Medium {
-            level: sphere.level,
-            ior: self.scene.materials[sphere.material].kind.ior(),
+            level: self.placement.spheres[hit.index].level,
+            ior: index_at(self.kind_of(hit.index), wavelength),
             sphere: hit.index,
         };
         cross_surface(&mut ray.media, medium, hit.inside);
@@ -279,13 +317,14 @@ impl PathTracer<'_> {
     /// What one lamp, chosen at random, sends over a vertex into the path.
     fn direct_light(
         &self,
-        ray: &Ray,
+        path: &Path,
         hit: &Hit,
         vertex: &Vertex,
         surface: &Surface,
         u: [f64; 4],
     ) -> Direct {
         let mut direct = Direct::default();
+        let ray = &path.ray;
         let spheres = &self.placement.spheres;
         let material = |index: usize| &self.scene.materials[spheres[index].material];
         let kind = &material(hit.index).kind;
@@ -306,7 +345,7 @@ impl PathTracer<'_> {
         let offset = self.placement.offset;
         let mut shadow = leave(ray.clone(), hit, vertex, s.wi, crossed, offset);
         if crossed {
-            self.cross(&mut shadow, hit);
+            self.cross(&mut shadow, hit, path.wavelength);
         }
         // A ray that misses the limb by a rounding has seen the lamp all the same; lamps are sampled
         // from outside.

@@ -20,6 +20,11 @@ pub fn members(effects: &Effects) -> Vec<Member> {
     if effects.has(Effect::Absorption) {
         own.push(Member::vector("absorption"));
     }
+    if effects.has(Effect::Dispersion) {
+        own.push(Member::vector("sellmeier_b"));
+        own.push(Member::vector("sellmeier_c"));
+        own.push(Member::scalar("cauchy"));
+    }
     for (_, form) in effects.forms() {
         for member in form.members {
             if !own.contains(member) {
