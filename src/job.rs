@@ -37,7 +37,7 @@ pub fn prepare(scene: &Scene, settings: &Settings) -> Result<Job> {
     check_geometry(scene, settings)?;
     let placement = Placement::with_offset(scene, settings.width, settings.height, settings.offset);
     check_levels(&placement)?;
-    check_magnitudes(&placement)?;
+    check_magnitudes(scene, &placement)?;
     check_lens(scene, &placement)?;
     let effects = Effects::derive(scene, &placement, settings);
     check_view(settings, &effects)?;
@@ -211,7 +211,7 @@ fn check_levels(placement: &Placement) -> Result<()> {
 
 /// Refuses what the kernel's f32 cannot hold in the scene's own unit: next to a sphere of radius 1e20,
 /// one of radius 1e-20 has no size left.
-fn check_magnitudes(placement: &Placement) -> Result<()> {
+fn check_magnitudes(scene: &Scene, placement: &Placement) -> Result<()> {
     let refuse = |what: &str| {
         Err(Error::Placement(format!(
             "{what} in units of the whole scene is a number that the device cannot hold: the \
@@ -226,6 +226,10 @@ fn check_magnitudes(placement: &Placement) -> Result<()> {
         }
         if !sphere.anchor.as_vec3().is_finite() {
             return refuse(&format!("the center of sphere {}", sphere.source + 1));
+        }
+        let absorption = scene.materials[sphere.material].kind.absorption();
+        if !(absorption / placement.scale).as_vec3().is_finite() {
+            return refuse(&format!("the absorption in sphere {}", sphere.source + 1));
         }
     }
     if let Some(distances) = placement.offset.distances()

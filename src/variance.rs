@@ -140,7 +140,7 @@ fn worst_cycle(scene: &Scene, placement: &Placement, k: i32, termination: f64) -
                 factor: moment_factor(kind, channel, k, termination),
                 material: sphere.material,
                 sees_itself: sphere.side != Side::Outside,
-                bounded: kind.is_delta() && termination == 0.0,
+                bounded: !kind.form().is_hemispherical() && termination == 0.0,
             }
         };
         let factors: Vec<Factor> = placement.spheres.iter().map(factor).collect();

@@ -105,6 +105,7 @@ fn other_kernels_agree_with_the_reference() {
         "lecture-reflective",
         "tests/glass-ball",
         "tests/nested",
+        "tests/rough-glass",
     ];
     check(names.into_iter().flat_map(|name| {
         let scene = scene_file(format!("scenes/{name}.toml"));
@@ -133,7 +134,7 @@ fn perturbed(scene: &Scene, factor: f64) -> Scene {
         match &mut material.kind {
             MaterialKind::Diffuse(m) => m.albedo *= factor,
             MaterialKind::Mirror(m) => m.reflectance *= factor,
-            MaterialKind::Dielectric(m) => m.ior = 1.0 + factor * (m.ior - 1.0),
+            MaterialKind::Dielectric(m) => m.ior = m.ior.map(|ior| 1.0 + factor * (ior - 1.0)),
             MaterialKind::Reflective(m) => m.albedo *= factor,
             MaterialKind::Conductor(m) => m.k = m.k.map(|k| factor * k),
             MaterialKind::Ashikhmin(m) => m.diffuse *= factor,

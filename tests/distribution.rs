@@ -223,7 +223,7 @@ fn moments_are_within_their_bounds() {
 
 /// How often glass reflects, against Fresnel's share; `factor` on the share.
 fn glass(factor: f64) -> Vec<Outcome> {
-    let kinds = [1.5, 2.4].map(|ior| MaterialKind::from(Dielectric { ior }));
+    let kinds = [1.5, 2.4].map(|ior| MaterialKind::from(Dielectric::smooth(ior)));
     let subjects = Subjects::of(&gpu(), kinds.into(), Integrator::Bsdf);
     let subjects = subjects.unwrap_or_else(|e| panic!("{e}"));
     let mut outcomes = Vec::new();

@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex};
 
 use crate::common::{scene_file, scene_files};
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use gpu_trace::effects::{Effect, Effects, table};
 use gpu_trace::image::Picture;
 use gpu_trace::materials::{ALL, MaterialKind, forms};
@@ -143,13 +143,25 @@ fn environment_of(set: &Set) -> Option<Environment> {
 /// A scene and settings that ask for exactly the effects of `set`, where that is possible.
 fn asking_for(set: &Set) -> (Scene, Settings) {
     let has = |effect| set.contains(&effect);
-    let kinds: Vec<MaterialKind> = set
+    let mut kinds: Vec<MaterialKind> = set
         .iter()
         .filter_map(|effect| match effect {
             Effect::Form(code) => Some(of_form(*code)),
             _ => None,
         })
         .collect();
+    for kind in &mut kinds {
+        let MaterialKind::Dielectric(glass) = kind else {
+            continue;
+        };
+        if has(Effect::Absorption) {
+            glass.absorption = DVec3::new(0.0, 0.1, 0.2);
+        }
+        if has(Effect::Dispersion) {
+            glass.ior = None;
+            glass.cauchy = Some(DVec2::new(1.5, 0.01));
+        }
+    }
     let material = |(i, kind): (usize, &MaterialKind)| Material {
         name: format!("m{i}"),
         kind: kind.clone(),

@@ -10,6 +10,7 @@ use gpu_trace::gpu::layout::{
     SphereRecord,
 };
 use gpu_trace::gpu::probe::ShapeRecord;
+use gpu_trace::materials::dielectric::Index;
 use gpu_trace::materials::{ALL, Form, Member, MemberKind, MemberValue, forms};
 use gpu_trace::placement::Placement;
 use gpu_trace::scene::Material;
@@ -351,13 +352,22 @@ fn wrong_record(material: &Material, members: &[Member], code: u32) -> Option<St
     let pairs: Vec<(Member, u32)> = std::iter::zip(members, &offsets)
         .map(|(member, (_, offset))| (*member, *offset))
         .collect();
-    let bytes = MaterialRecord::new(material, 2.0).bytes(&pairs, size);
+    let bytes = MaterialRecord::new(material, 2.0, 4.0).bytes(&pairs, size);
     let form = material.kind.form();
     let mut values: Vec<(&str, MemberValue)> = vec![
         ("color", material.kind.color().into()),
         ("kind", MemberValue::Word(code)),
         ("emission", (2.0 * material.emission).into()),
+        ("absorption", (0.25 * material.kind.absorption()).into()),
     ];
+    match material.kind.dispersion() {
+        Some(Index::Cauchy(terms)) => values.push(("cauchy", terms.y.into())),
+        Some(Index::Sellmeier(terms)) => {
+            values.push(("sellmeier_b", terms.b.into()));
+            values.push(("sellmeier_c", terms.c.into()));
+        }
+        _ => {}
+    }
     let own = form.members.iter().map(|member| member.name);
     values.extend(own.zip(material.kind.members()));
     pairs.iter().find_map(|(member, offset)| {
@@ -382,16 +392,20 @@ fn material_agrees_for_all_forms() {
             let mut names = vec!["list"];
             names.extend(chosen.iter().map(|form| form.name));
             names.extend(emission.then_some("emission"));
-            names.extend(
-                chosen
-                    .iter()
-                    .any(|form| form.transmits)
-                    .then_some("interior"),
-            );
+            let transmits = chosen.iter().any(|form| form.transmits);
+            names.extend(transmits.then_some("interior"));
+            let absorbs = emission && transmits;
+            names.extend(absorbs.then_some("absorption"));
+            names.extend(absorbs.then_some("dispersion"));
             let members = material_members(&Effects::named(&names));
             // Those of the forms, each once, and what all have.
             let mut wanted: Vec<Member> = vec![Member::vector("color"), Member::word("kind")];
             wanted.extend(emission.then_some(Member::vector("emission")));
+            wanted.extend(absorbs.then_some(Member::vector("absorption")));
+            if absorbs {
+                wanted.extend(["sellmeier_b", "sellmeier_c"].map(Member::vector));
+                wanted.push(Member::scalar("cauchy"));
+            }
             for member in chosen.iter().flat_map(|form| form.members) {
                 if !wanted.contains(member) {
                     wanted.push(*member);

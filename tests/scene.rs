@@ -106,7 +106,7 @@ fn the_good_scene_is_read_as_written() {
     assert_eq!(names, ["white", "glass", "shiny"], "in file order");
     assert_eq!(
         scene.materials[1].kind,
-        MaterialKind::from(Dielectric { ior: 1.5 })
+        MaterialKind::from(Dielectric::smooth(1.5))
     );
     assert_eq!(scene.materials[0].emission, DVec3::splat(2.0));
     assert_eq!(scene.spheres[1].priority, Some(2));
@@ -184,6 +184,11 @@ fn numbers_outside_of_their_range_are_refused() {
         emission = [2.0 | emission = [-2.0 | 20:13 | `emission` must be at least 0
         radiance = [0.7 | radiance = [-0.7 | 16:13 | `radiance` must be at least 0
         ior = 1.5 | ior = 0.0 | 23:7 | `ior` must be greater than 0
+        ior = 1.5 | ior = 1.5\nroughness = 1.1 | 24:13 | `roughness` must be in [0, 1]
+        ior = 1.5 | ior = 1.5\nabsorption = [0, -1, 0] | 24:18 | `absorption` must be
+        ior = 1.5 | cauchy = [1.5] | 23:10 | `cauchy` must have exactly 2 numbers
+        ior = 1.5 | preset = "BK8" | 23:10 | did you mean "BK7"?
+        ior = 1.5 | sellmeier = { b = [1, 0, 0] } | 23:13 | `c` is missing in
         fov = 36.0 | fov = 0 | 5:7 | `fov` must be in (0, 180)
         fov = 36.0 | fov = 180 | 5:7 | `fov` must be in (0, 180)
         epsilon = 0.01 | epsilon = 0 | 28:11 | `epsilon` must be in (0, 1]
@@ -312,7 +317,6 @@ fn missing_keys_name_their_table() {
         fov = 36.0\n | (nothing) | 1:1 | `fov` is missing in `[camera]`
         height = 48\n | (nothing) | 9:1 | `height` is missing in `[image]`
         radius = 0.5\n | (nothing) | 34:1 | `radius` is missing in this `[[sphere]]`
-        ior = 1.5\n | (nothing) | 21:1 | `ior` is missing in `[material.glass]`
         type = "dielectric"\n | (nothing) | 21:1 | help: add `type = "dielectric"`
         radiance = [0.7, 0.8, 1.0]\n | (nothing) | 15:1 | is missing in `[environment]`
         [image]\nwidth = 64\nheight = 48\n | (nothing) | 1:1 | `image` is missing in the scene file
@@ -352,6 +356,11 @@ fn values_that_contradict_each_other_are_refused() {
         [0.0, 0.0, 6.0]\nup = [0.0, 1.0, 0.0]\n | [0, 9, -4]\n | 3:11 | `up`, (0, 1, 0) by default,
         focus_distance = 4.0\n | (nothing) | 7:19 | `focus_distance = 10.0` focuses on `look_at`
         material = "glass" | material = "white" | 38:12 | priority` needs a dielectric
+        ior = 1.5\n | (nothing) | 22:1 | a dielectric needs its index in `[material.glass]`
+        ior = 1.5 | preset = "BK7"\nior = 1.5 | 23:1 | the index is given more than once in `[material.glass]`
+        ior = 1.5 | ior = 1.5\ncauchy = [1.5, 0.01] | 24:1 | give one of `ior`, `preset`, `cauchy` and `sellmeier`
+        ior = 1.5 | cauchy = [1.0, -0.2] | 23:1 | `cauchy` is no index at some wavelength from 360 to 830 nm
+        ior = 1.5 | sellmeier = { b = [1, 0, 0], c = [0.3, 0, 0] } | 23:1 | `sellmeier` is no index at some wavelength
         "#,
     ) {
         check(&from, &to, &place, &[&part]);

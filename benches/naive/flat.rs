@@ -52,9 +52,9 @@ fn ior_around(scene: &Scene, index: usize) -> f64 {
             outer.radius > inner.radius
                 && (outer.center - inner.center).length() < outer.radius - inner.radius + 1.0e-12
         })
-        .filter_map(|outer| match &scene.materials[outer.material].kind {
-            MaterialKind::Dielectric(glass) => Some((outer.radius, glass.ior)),
-            _ => None,
+        .filter_map(|outer| {
+            let kind = &scene.materials[outer.material].kind;
+            kind.transmits().then(|| (outer.radius, kind.ior()))
         })
         .min_by(|a, b| a.0.total_cmp(&b.0))
         .map_or(1.0, |(_, ior)| ior)
@@ -68,7 +68,9 @@ impl FlatScene {
             let (kind, color, ior) = match &material.kind {
                 MaterialKind::Diffuse(m) => (Kind::Diffuse, m.albedo, 1.0),
                 MaterialKind::Mirror(m) => (Kind::Mirror, m.reflectance, 1.0),
-                MaterialKind::Dielectric(m) => (Kind::Dielectric, DVec3::ONE, m.ior),
+                glass @ MaterialKind::Dielectric(_) if glass.is_delta() => {
+                    (Kind::Dielectric, DVec3::ONE, glass.ior())
+                }
                 other => panic!("the naive tracers do not know {}", other.name()),
             };
             FlatSphere {

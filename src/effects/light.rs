@@ -91,6 +91,7 @@ pub(super) fn rows() -> Vec<Row> {
             "share_of_emission",
             "light_weight",
             "LIGHT_COUNT",
+            "both_sides",
         ]),
         Row::new(
             Effect::Skylight,
@@ -139,7 +140,7 @@ pub(super) fn rows() -> Vec<Row> {
             },
         )
         .needs([Effect::Lights])
-        .marks(["light_from_table", "cone_height"]),
+        .marks(["light_from_table"]),
         Row::new(
             Effect::Mis,
             "mis",

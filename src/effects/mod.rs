@@ -62,6 +62,10 @@ pub enum Effect {
     Form(u32),
     /// Dielectrics that share points.
     Priority,
+    /// Light that dielectrics absorb.
+    Absorption,
+    /// Refractive indices by the wavelength.
+    Dispersion,
     /// Surfaces that emit.
     Emission,
     /// A constant environment.
@@ -356,6 +360,17 @@ impl Effects {
         self.has(Effect::Lights) || self.has(Effect::Skylight)
     }
 
+    /// Whether light sampling looks for lamps on both sides of a surface.
+    #[must_use]
+    pub fn looks_through(&self) -> bool {
+        self.has(Effect::Lights) && self.is_translucent()
+    }
+
+    /// Whether a surface scatters light to its other side.
+    fn is_translucent(&self) -> bool {
+        self.forms().any(|(_, form)| form.is_translucent())
+    }
+
     /// Name and state of every flag that the kernel's sources may ask for: effects, and what follows from
     /// them.
     pub fn flags(&self) -> impl Iterator<Item = (&'static str, bool)> {
@@ -368,6 +383,8 @@ impl Effects {
             ("relative", self.looks_at_index()),
             ("weighed", self.weighs_lights()),
             ("sampled", self.samples_light()),
+            ("through", self.looks_through()),
+            ("crossing", self.samples_light() && self.is_translucent()),
         ])
     }
 

@@ -1,5 +1,7 @@
 //! Effects of what surfaces are made of.
 
+use glam::DVec3;
+
 use super::{Effect, Row};
 use crate::materials::{Form, forms};
 
@@ -44,5 +46,31 @@ pub(super) fn rows() -> Vec<Row> {
         "Media::sphere",
         "Attributes::level",
     ]);
-    materials.chain([priority]).collect()
+    let absorption = Row::new(
+        Effect::Absorption,
+        "absorption",
+        "light that dielectrics absorb on its way through them",
+        |asked| asked.surfaces(|material| material.kind.absorption() != DVec3::ZERO),
+    )
+    .needs(forms_that(|form| form.transmits))
+    .marks(["absorption", "absorption_within", "absorb"]);
+    let dispersion = Row::new(
+        Effect::Dispersion,
+        "dispersion",
+        "refractive indices by the wavelength, of which a path keeps one",
+        |asked| asked.surfaces(|material| material.kind.dispersion().is_some()),
+    )
+    .needs(forms_that(|form| form.transmits))
+    .marks([
+        "spectrum",
+        "dispersion",
+        "wavelength",
+        "WAVELENGTH",
+        "INITIAL_DISPERSIVE",
+        "keep_wavelength",
+        "Path::spectral",
+    ]);
+    materials
+        .chain([priority, absorption, dispersion])
+        .collect()
 }

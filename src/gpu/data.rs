@@ -230,7 +230,7 @@ fn materials(kernel: &Kernel, scene: &Scene, placement: &Placement, effects: &Ef
     let members: Vec<(Member, u32)> = std::iter::zip(material_members(effects), offsets)
         .map(|(member, (_, offset))| (member, offset))
         .collect();
-    let record = |m| MaterialRecord::new(m, placement.radiance_scale);
+    let record = |m| MaterialRecord::new(m, placement.radiance_scale, placement.scale);
     let materials = scene.materials.iter();
     materials
         .flat_map(|m| record(m).bytes(&members, size))

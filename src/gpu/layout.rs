@@ -9,6 +9,7 @@ use glam::DVec3;
 
 use crate::effects::{Effect, Effects};
 use crate::film::{TILE, Tiles};
+use crate::materials::dielectric::Index;
 use crate::materials::{Member, MemberValue, forms};
 use crate::placement::sky::{Band, Entry};
 use crate::placement::{Light, PlacedCamera, PlacedSphere, Placement, SkyTable};
@@ -277,6 +278,33 @@ pub struct CountersRecord {
     pub advanced: u32,
 }
 
+/// What a material's inner side absorbs per unit length of the kernel. Below the normal numbers of f32 it is the least
+/// of these, which is as good as nothing on any way that is not infinite.
+fn absorption(material: &Material, length: f64) -> [f32; 3] {
+    let rounded = |x: f64| match x {
+        0.0 => 0.0,
+        x => ((x / length) as f32).max(f32::MIN_POSITIVE),
+    };
+    material.kind.absorption().to_array().map(rounded)
+}
+
+/// What says how a material's index depends on the wavelength: 0 where it does not.
+fn dispersion(material: &Material) -> [(Member, MemberValue); 3] {
+    let (cauchy, terms) = match material.kind.dispersion() {
+        Some(Index::Cauchy(terms)) => (terms.y, None),
+        Some(Index::Sellmeier(terms)) => (0.0, Some(terms)),
+        Some(Index::Constant(_)) | None => (0.0, None),
+    };
+    let [b, c] = terms.map_or([DVec3::ZERO; 2], |terms| [terms.b, terms.c]);
+    // A term of no strength is none, wherever its resonance is.
+    let c = DVec3::select(b.cmpeq(DVec3::ZERO), DVec3::ZERO, c);
+    [
+        (Member::scalar("cauchy"), cauchy.into()),
+        (Member::vector("sellmeier_b"), b.into()),
+        (Member::vector("sellmeier_c"), c.into()),
+    ]
+}
+
 /// What a kernel may want to know of a material, rounded to f32.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MaterialRecord {
@@ -284,12 +312,12 @@ pub struct MaterialRecord {
 }
 
 impl MaterialRecord {
-    /// The record of `material`, emission times `light`.
+    /// The record of `material`, emission times `light`, for lengths that are multiplied by `length`.
     ///
     /// # Panics
     /// If the form of the material is not in the list of all forms.
     #[must_use]
-    pub fn new(material: &Material, light: f64) -> Self {
+    pub fn new(material: &Material, light: f64, length: f64) -> Self {
         let form = material.kind.form();
         let code = forms().iter().position(|f| *f == form);
         let code = code.expect("every material is in the list");
@@ -300,10 +328,15 @@ impl MaterialRecord {
                 Member::vector("emission"),
                 (material.emission * light).into(),
             ),
+            (
+                Member::vector("absorption"),
+                MemberValue::Vector(absorption(material, length)),
+            ),
         ];
         let own = form.members.iter().copied().zip(material.kind.members());
+        let common = common.into_iter().chain(dispersion(material));
         Self {
-            values: common.into_iter().chain(own).collect(),
+            values: common.chain(own).collect(),
         }
     }
 

@@ -35,6 +35,19 @@ impl Form {
             members: &[],
         }
     }
+
+    /// Whether the lecture's estimator draws its directions, uniformly from the hemisphere. Delta lobes have none to
+    /// draw, and where paths cross the surface that is no hemisphere: it chooses its own directions.
+    #[must_use]
+    pub const fn is_hemispherical(&self) -> bool {
+        !self.delta && !self.transmits
+    }
+
+    /// Whether it scatters light through the surface, so that lamps beyond it are looked for.
+    #[must_use]
+    pub const fn is_translucent(&self) -> bool {
+        self.transmits && !self.delta
+    }
 }
 
 /// A member of the kernel's `Material`. Materials may share one, of one kind.

@@ -42,6 +42,17 @@ impl Frame {
         }
     }
 
+    /// With any tangents.
+    #[must_use]
+    pub fn around(normal: DVec3) -> Self {
+        let basis = basis_around(normal);
+        Self {
+            tangent: basis.tangent,
+            bitangent: basis.bitangent,
+            normal,
+        }
+    }
+
     /// The vector's components.
     #[must_use]
     pub fn to_local(&self, w: DVec3) -> DVec3 {

@@ -19,9 +19,11 @@ mod uniform;
 use std::ops::Deref;
 use std::sync::LazyLock;
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::Deserialize;
+
+use dielectric::Index;
 
 pub use contract::{BsdfSample, BsdfValue, Event, Surface};
 pub use form::{Form, Member, MemberKind, MemberValue};
@@ -55,9 +57,19 @@ pub trait Bsdf {
     /// f cos of `wi` and the pdf with which [`sample`](Self::sample) finds it, without delta lobes.
     fn evaluate(&self, surface: &Surface, wo: DVec3, wi: DVec3) -> BsdfValue;
 
-    /// Absolute refractive index of the inner side; 1 where paths do not cross the surface.
+    /// Absolute refractive index of the inner side, in a word; 1 where paths do not cross the surface.
     fn ior(&self) -> f64 {
         1.0
+    }
+
+    /// The index by the wavelength, where it depends on it.
+    fn dispersion(&self) -> Option<Index> {
+        None
+    }
+
+    /// What is absorbed of light on its inner side, per unit length of the scene, by channel.
+    fn absorption(&self) -> DVec3 {
+        DVec3::ZERO
     }
 
     /// What is wrong with its parameters together.
@@ -89,6 +101,15 @@ pub enum Value {
     Number(f64),
     /// A colour or a vector.
     Vector(DVec3),
+    /// Two numbers.
+    Pair(DVec2),
+    /// Sellmeier's terms.
+    Terms {
+        /// Strengths.
+        b: DVec3,
+        /// Squares of wavelengths.
+        c: DVec3,
+    },
 }
 
 /// A type of materials.
@@ -207,12 +228,22 @@ impl MaterialKind {
     pub fn is_delta(&self) -> bool {
         self.form().delta
     }
+
+    /// Whether it scatters light through the surface.
+    #[must_use]
+    pub fn is_translucent(&self) -> bool {
+        self.form().is_translucent()
+    }
 }
 
 /// All forms of all materials; the place of one is its code in the kernel.
 pub fn forms() -> &'static [&'static Form] {
-    static FORMS: LazyLock<Vec<&'static Form>> =
-        LazyLock::new(|| ALL.iter().flat_map(|material| material.forms).collect());
+    static FORMS: LazyLock<Vec<&'static Form>> = LazyLock::new(|| {
+        let mut forms: Vec<&Form> = ALL.iter().flat_map(|material| material.forms).collect();
+        // Rough glass last: so the others keep the codes that they had before it, and kernels their text.
+        forms.sort_by_key(|form| form.is_translucent());
+        forms
+    });
     &FORMS
 }
 

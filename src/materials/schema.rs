@@ -30,6 +30,13 @@ pub fn radiance(_: &mut SchemaGenerator) -> Schema {
     vector(0.0, MAX_MAGNITUDE)
 }
 
+/// What a medium absorbs per unit length, and its default.
+pub fn absorption(_: &mut SchemaGenerator) -> Schema {
+    let mut schema = vector(0.0, MAX_MAGNITUDE);
+    schema.insert("default".into(), serde_json::json!([0.0, 0.0, 0.0]));
+    schema
+}
+
 /// An axis, and its default.
 pub fn axis(_: &mut SchemaGenerator) -> Schema {
     let mut schema = vector(-MAX_MAGNITUDE, MAX_MAGNITUDE);

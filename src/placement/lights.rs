@@ -73,7 +73,7 @@ fn sealed(scene: &Scene, lamps: &[usize]) -> Vec<bool> {
     // Dielectrics with nothing in them that scatters, and lamps that are alone in one.
     let mut clear = Vec::new();
     let mut alone = HashSet::new();
-    for glass in all.filter(|i| kind(i).transmits()) {
+    for glass in all.filter(|i| kind(i).transmits() && kind(i).is_delta()) {
         // If there are two, one is left beside any lamp.
         let mut inside = Vec::new();
         rough_tree.search(

@@ -4,13 +4,15 @@ use glam::DVec3;
 
 use super::core::random::{random4, sample_key};
 use super::core::sobol::sobol4;
+use super::core::spectrum::sample_wavelength;
 use super::light::aim::aim_at;
 use super::light::environment::{environment_radiance, sky_place};
 use super::light::skylight::{NO_SPHERE, SKY_SHARE, sample_sky, sky_density};
 use super::light::sphere::{LightSample, light_pdf, mis_weight, sample_light};
-use super::purpose::{CAMERA, lighting, scattering};
+use super::purpose::{CAMERA, WAVELENGTH, lighting, scattering};
+use super::scene::absorption::transmittance;
 use super::scene::camera::camera_ray;
-use super::scene::priority::{cross_surface, index_within, relative_index};
+use super::scene::priority::{Media, cross_surface, filling, index_within, relative_index};
 use super::scene::ray::{Hit, Ray, Vertex, leave, vertex_at};
 use super::scene::sphere::closest_hit;
 use crate::film::{AovSums, LightClass};
@@ -37,6 +39,14 @@ pub fn next_class(class: LightClass, event: Event) -> LightClass {
     }
 }
 
+/// The index of a material for a path that keeps a wavelength, or none.
+fn index_at(kind: &MaterialKind, wavelength: Option<f64>) -> f64 {
+    match (kind.dispersion(), wavelength) {
+        (Some(index), Some(wavelength)) => index.at(wavelength),
+        _ => kind.ior(),
+    }
+}
+
 /// What one path found.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PathResult {
@@ -58,6 +68,8 @@ struct Path {
     throughput: DVec3,
     /// Product of the index ratios squared of the refractions so far.
     eta_scale: f64,
+    /// That it keeps, in nm.
+    wavelength: Option<f64>,
     departure: Departure,
     class: LightClass,
     found: PathResult,
@@ -110,6 +122,7 @@ impl PathTracer<'_> {
             ray: camera_ray(&placement.camera, pixel, random(CAMERA), &placement.within),
             throughput: DVec3::ONE,
             eta_scale: 1.0,
+            wavelength: None,
             departure: Departure::default(),
             class: LightClass::Emission,
             found: PathResult::default(),
@@ -123,7 +136,9 @@ impl PathTracer<'_> {
     /// does.
     fn extend(&self, path: &mut Path, random: &dyn Fn(u32) -> [f64; 4]) -> bool {
         path.found.rays += 1;
-        let Some(hit) = closest_hit(&path.ray, &self.placement.spheres) else {
+        let hit = closest_hit(&path.ray, &self.placement.spheres);
+        path.throughput *= self.transmittance(&path.ray.media, hit.map(|hit| hit.t));
+        let Some(hit) = hit else {
             let w = path.ray.direction;
             let share = self.share_of_sky(w, path.departure);
             let sky = environment_radiance(self.scene, w);
@@ -134,16 +149,21 @@ impl PathTracer<'_> {
         let material = &self.scene.materials[sphere.material];
         let share = self.share_of_emission(&path.ray, &hit, path.departure);
         path.receive(path.class, path.throughput * share * material.emission);
-        let vertex = vertex_at(&path.ray, &hit, sphere);
+        self.keep_wavelength(path, &material.kind, random);
+        let vertex = Vertex {
+            both_sides: material.kind.is_translucent(),
+            ..vertex_at(&path.ray, &hit, sphere)
+        };
         if path.found.bounces == 0 {
             self.see(path, &hit, &vertex, material);
         }
         if path.found.bounces == self.settings.max_bounces {
-            path.found.cut = path.throughput;
+            path.found.cut = path.throughput.abs();
             return false;
         }
         let u = random(scattering(path.found.bounces));
-        let (media, ior) = (&path.ray.media, material.kind.ior());
+        let ior = index_at(&material.kind, path.wavelength);
+        let media = &path.ray.media;
         let surface = Surface {
             normal: vertex.normal,
             eta: if material.kind.transmits() {
@@ -155,7 +175,7 @@ impl PathTracer<'_> {
         let wo = -path.ray.direction;
         if self.samples_lamps() || self.sky().is_some() {
             let v = random(lighting(path.found.bounces));
-            let direct = self.direct_light(&path.ray, &hit, &vertex, &surface, v);
+            let direct = self.direct_light(path, &hit, &vertex, &surface, v);
             let class = direct
                 .event
                 .map_or(path.class, |e| next_class(path.class, e));
@@ -165,6 +185,15 @@ impl PathTracer<'_> {
         }
         let s = self.sample(&material.kind, &surface, wo, u);
         self.go_on(path, &hit, &vertex, &s, u[3])
+    }
+
+    /// What is left of light after a length `t` in what fills the space, `None` for infinitely far.
+    fn transmittance(&self, media: &Media, t: Option<f64>) -> DVec3 {
+        let Some(medium) = filling(media) else {
+            return DVec3::ONE;
+        };
+        let absorption = self.kind_of(medium.sphere).absorption();
+        transmittance(absorption / self.placement.scale, t)
     }
 
     /// Takes note of what is seen first.
@@ -178,7 +207,8 @@ impl PathTracer<'_> {
         aovs.hits = 1.0;
     }
 
-    /// Lets the material choose a direction; by the lecture's integrator it is uniform but for delta lobes.
+    /// Lets the material choose a direction; by the lecture's integrator it is uniform where it is
+    /// [hemispherical](crate::materials::Form::is_hemispherical).
     fn sample(
         &self,
         material: &MaterialKind,
@@ -187,7 +217,7 @@ impl PathTracer<'_> {
         u: [f64; 4],
     ) -> BsdfSample {
         match self.settings.integrator {
-            Integrator::Lecture { .. } if !material.is_delta() => {
+            Integrator::Lecture { .. } if material.form().is_hemispherical() => {
                 sample_uniform(&**material, surface, wo, u)
             }
             _ => material.sample(surface, wo, u),
@@ -198,10 +228,12 @@ impl PathTracer<'_> {
     fn go_on(&self, path: &mut Path, hit: &Hit, vertex: &Vertex, s: &BsdfSample, u: f64) -> bool {
         path.class = next_class(path.class, s.event);
         path.departure.pdf = s.pdf;
-        path.departure.pdf_per_weight *= vertex.normal.dot(s.wi).max(0.0);
+        if !vertex.both_sides {
+            path.departure.pdf_per_weight *= vertex.normal.dot(s.wi).max(0.0);
+        }
         path.throughput *= s.weight;
         path.eta_scale *= s.eta * s.eta;
-        let largest = (path.throughput * path.eta_scale).max_element();
+        let largest = (path.throughput.abs() * path.eta_scale).max_element();
         let survival = match self.settings.integrator {
             Integrator::Lecture { termination } => 1.0 - termination,
             _ if self.settings.roulette => roulette_survival(largest),
@@ -215,16 +247,46 @@ impl PathTracer<'_> {
         let arrived = path.ray.clone();
         path.ray = leave(arrived, hit, vertex, s.wi, crossed, self.placement.offset);
         if crossed {
-            let sphere = &self.placement.spheres[hit.index];
-            let medium = Medium {
-                level: sphere.level,
-                ior: self.scene.materials[sphere.material].kind.ior(),
-                sphere: hit.index,
-            };
-            cross_surface(&mut path.ray.media, medium, hit.inside);
+            self.cross(&mut path.ray, hit, path.wavelength);
         }
         path.found.bounces += 1;
         true
+    }
+
+    /// Keeps one wavelength from here on, if it does not yet and an index here depends on it. Paths begin without one
+    /// in dispersive media, too.
+    fn keep_wavelength(
+        &self,
+        path: &mut Path,
+        surface: &MaterialKind,
+        random: &dyn Fn(u32) -> [f64; 4],
+    ) {
+        let mut within = path.ray.media.iter().map(|m| self.kind_of(m.sphere));
+        let disperses = |kind: &MaterialKind| kind.dispersion().is_some();
+        if path.wavelength.is_some() || !(disperses(surface) || within.any(disperses)) {
+            return;
+        }
+        let spectral = sample_wavelength(random(WAVELENGTH)[1]);
+        path.throughput *= spectral.weight;
+        path.wavelength = Some(spectral.wavelength);
+        for medium in &mut path.ray.media {
+            medium.ior = index_at(self.kind_of(medium.sphere), path.wavelength);
+        }
+    }
+
+    /// The material of a sphere of the placement.
+    fn kind_of(&self, sphere: usize) -> &MaterialKind {
+        &self.scene.materials[self.placement.spheres[sphere].material].kind
+    }
+
+    /// Changes the media of a ray that has crossed the surface.
+    fn cross(&self, ray: &mut Ray, hit: &Hit, wavelength: Option<f64>) {
+        let medium = Medium {
+            level: self.placement.spheres[hit.index].level,
+            ior: index_at(self.kind_of(hit.index), wavelength),
+            sphere: hit.index,
+        };
+        cross_surface(&mut ray.media, medium, hit.inside);
     }
 }
 
@@ -320,13 +382,14 @@ impl PathTracer<'_> {
     /// What one lamp, chosen at random, or the image sends over a vertex into the path.
     fn direct_light(
         &self,
-        ray: &Ray,
+        path: &Path,
         hit: &Hit,
         vertex: &Vertex,
         surface: &Surface,
         u: [f64; 4],
     ) -> Direct {
         let mut direct = Direct::default();
+        let ray = &path.ray;
         let spheres = &self.placement.spheres;
         let material = |index: usize| &self.scene.materials[spheres[index].material];
         let kind = &material(hit.index).kind;
@@ -342,10 +405,16 @@ impl PathTracer<'_> {
         if s.pdf <= 0.0 || f.pdf <= 0.0 {
             return direct;
         }
-        let shadow = leave(ray.clone(), hit, vertex, s.wi, false, self.placement.offset);
+        let crossed = f.event.is(Event::TRANSMITTED);
+        let offset = self.placement.offset;
+        let mut shadow = leave(ray.clone(), hit, vertex, s.wi, crossed, offset);
+        if crossed {
+            self.cross(&mut shadow, hit, path.wavelength);
+        }
         // A ray that misses the limb by a rounding has seen the lamp all the same; lamps are sampled
         // from outside.
-        let hidden = closest_hit(&shadow, spheres).is_some_and(|first| {
+        let first = closest_hit(&shadow, spheres);
+        let hidden = first.is_some_and(|first| {
             if first.index == s.sphere {
                 first.inside
             } else {
@@ -366,6 +435,11 @@ impl PathTracer<'_> {
             material(s.sphere).emission
         };
         direct.radiance = share / s.pdf * f.f_cos * radiance;
+        let length = match first.filter(|first| first.index == s.sphere) {
+            Some(first) => Some(first.t),
+            None => Some(s.limb).filter(|limb| limb.is_finite()),
+        };
+        direct.radiance *= self.transmittance(&shadow.media, length);
         direct
     }
 }

@@ -4,6 +4,9 @@
 /// Place in the pixel (x, y) and on the lens (z, w).
 pub const CAMERA: u32 = 0;
 
+/// Time (x), wavelength (y).
+pub const WAVELENGTH: u32 = 1;
+
 /// A scattering event: direction (x, y), lobe (z), roulette (w).
 #[must_use]
 pub fn scattering(bounce: u32) -> u32 {

@@ -65,6 +65,16 @@ pub const GALLERY: &[Builtin] = &[
         description: "nylon as measured, dyed, and with other distributions of microfacets",
         text: include_str!("../../scenes/nylon.toml"),
     },
+    Builtin {
+        name: "frosted-glass",
+        description: "frosted and tinted glass balls on a table, one around a lamp",
+        text: include_str!("../../scenes/frosted-glass.toml"),
+    },
+    Builtin {
+        name: "prism",
+        description: "coloured caustics of glass whose index depends on the wavelength",
+        text: include_str!("../../scenes/prism.toml"),
+    },
 ];
 
 /// The names of the built-in scenes, the default one first.

@@ -129,6 +129,14 @@ impl Fnv {
             match value {
                 Value::Number(number) => self.number(number),
                 Value::Vector(vector) => self.vector(vector),
+                Value::Pair(pair) => {
+                    self.number(pair.x);
+                    self.number(pair.y);
+                }
+                Value::Terms { b, c } => {
+                    self.vector(b);
+                    self.vector(c);
+                }
             }
         }
     }
@@ -172,7 +180,7 @@ mod tests {
         let change = |kind: &mut MaterialKind| match kind {
             MaterialKind::Diffuse(m) => m.albedo.z += 0.1,
             MaterialKind::Mirror(m) => m.reflectance.x += 0.1,
-            MaterialKind::Dielectric(m) => m.ior += 1e-9,
+            MaterialKind::Dielectric(m) => m.ior = m.ior.map(|ior| ior + 1e-9),
             MaterialKind::Reflective(m) => m.mu += 1.0,
             MaterialKind::Conductor(m) => m.roughness += 0.1,
             MaterialKind::Ashikhmin(m) => m.nv += 0.1,

@@ -66,6 +66,10 @@ fn to_toml(scene: &Scene) -> String {
             add(match value {
                 Value::Number(number) => format!("{key} = {number:?}"),
                 Value::Vector(v) => format!("{key} = {}", vector(v)),
+                Value::Pair(pair) => format!("{key} = [{:?}, {:?}]", pair.x, pair.y),
+                Value::Terms { b, c } => {
+                    format!("{key} = {{ b = {}, c = {} }}", vector(b), vector(c))
+                }
             });
         }
     }

@@ -17,6 +17,14 @@ pub fn members(effects: &Effects) -> Vec<Member> {
     if effects.has(Effect::Emission) {
         own.push(Member::vector("emission"));
     }
+    if effects.has(Effect::Absorption) {
+        own.push(Member::vector("absorption"));
+    }
+    if effects.has(Effect::Dispersion) {
+        own.push(Member::vector("sellmeier_b"));
+        own.push(Member::vector("sellmeier_c"));
+        own.push(Member::scalar("cauchy"));
+    }
     for (_, form) in effects.forms() {
         for member in form.members {
             if !own.contains(member) {
@@ -41,14 +49,15 @@ pub(super) fn module(effects: &Effects) -> String {
     let forms: Vec<(u32, &Form)> = effects.forms().collect();
     let mut text =
         String::from("import package::materials::contract::{Surface, BsdfSample, BsdfValue};\n");
-    let uniform = effects.has(Effect::Lecture) && forms.iter().any(|(_, form)| !form.delta);
-    if uniform {
+    let lecture = effects.has(Effect::Lecture);
+    let uniform = |form: &Form| lecture && form.is_hemispherical();
+    if forms.iter().any(|(_, form)| uniform(form)) {
         text += "import package::materials::uniform::sample_uniform;\n";
     }
     for (_, form) in &forms {
         let (name, module) = (form.name, form.material.replace('-', "_"));
         // Writing to a String cannot fail.
-        if form.delta || !uniform {
+        if !uniform(form) {
             let _ = writeln!(text, "import package::materials::{module}::sample_{name};");
         }
         if !form.delta {
@@ -70,12 +79,12 @@ pub(super) fn module(effects: &Effects) -> String {
     text += "}\n";
     let sampled: Vec<(u32, String)> = forms
         .iter()
-        .map(|(code, form)| match form.delta || !uniform {
-            true => (
+        .map(|(code, form)| match uniform(form) {
+            false => (
                 *code,
                 format!("return sample_{}(surface, wo, u);", form.name),
             ),
-            false => (*code, "return sample_uniform(surface, wo, u);".into()),
+            true => (*code, "return sample_uniform(surface, wo, u);".into()),
         })
         .collect();
     let evaluated: Vec<(u32, String)> = forms
@@ -103,6 +112,7 @@ pub(super) fn module(effects: &Effects) -> String {
     text += "}\n";
     text += &predicate("is_delta", &forms, |form| form.delta);
     text += &predicate("transmits", &forms, |form| form.transmits);
+    text += &predicate("is_translucent", &forms, Form::is_translucent);
     text
 }
 

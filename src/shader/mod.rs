@@ -239,6 +239,15 @@ fn config(scene: &Scene, placement: &Placement, effects: &Effects) -> String {
             baked::number(out)
         );
     }
+    if effects.has(Effect::Dispersion) {
+        let kind = |medium: &Medium| {
+            let sphere = &placement.spheres[medium.sphere];
+            &scene.materials[sphere.material].kind
+        };
+        let dispersive = |medium| kind(medium).dispersion().is_some();
+        let any = placement.within.iter().any(dispersive);
+        text += &format!("const INITIAL_DISPERSIVE: bool = {any};\n");
+    }
     text += &initial_media(placement, effects);
     text
 }

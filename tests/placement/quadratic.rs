@@ -201,6 +201,7 @@ fn is_sealed(scene: &Scene, lamp: usize) -> bool {
         };
         glass != lamp
             && kind(outer).transmits()
+            && smooth(outer)
             && distance(inner) + inner.radius <= outer.radius
             && !scene
                 .spheres

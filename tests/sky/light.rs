@@ -34,7 +34,7 @@ fn with_sun(width: u32, height: u32, [column, row]: [u32; 2], sun: f32) -> Pictu
 fn images() -> Vec<(&'static str, Picture, f64)> {
     let mut sparse = Picture::new(16, 9, vec![[0.0; 3]; 16 * 9]);
     sparse.pixels[3 * 16 + 15] = [5.0, 0.0, 0.0];
-    sparse.pixels[6 * 16 + 4] = [0.0, 2.0, 1.0];
+    sparse.pixels[6 * 16 + 4] = [1.0, 2.0, 1.0];
     vec![
         (
             "a sun at the pole above",

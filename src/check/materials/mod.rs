@@ -42,8 +42,8 @@ pub(super) const CASES: &[Case] = &[
     Case {
         id: 25,
         name: "microfacets at grazing angles",
-        setup: "rough metals of roughness 0.2 to 1, both cosines 1e-6 to 1: value and pdf, with Smith's \
-                shadowing and masking, those of f64 to 1e-5",
+        setup: "rough metals of roughness 0.2 to 1, and rough glass of 0.5 and 1 on both sides of its surface, both \
+                cosines 1e-6 to 1: value and pdf, with Smith's shadowing and masking, those of f64 to 1e-5",
         run: microfacets::grazing,
     },
     Case {

@@ -92,7 +92,7 @@ fn through_glass(context: &Context, measure: &mut Measure) -> Result<()> {
             BsdfInput::new(0, &Surface { normal, eta }, wo, u)
         })
         .collect();
-    let glass = [MaterialKind::from(Dielectric { ior: 1.5 })];
+    let glass = [MaterialKind::from(Dielectric::smooth(1.5))];
     let probe = context.materials(&glass, Integrator::Bsdf)?;
     let crossed: Vec<(BsdfInput, Sampled)> = std::iter::zip(there.iter(), probe.sample(&there)?)
         .filter(|(_, s)| s.event & Event::TRANSMITTED.bits() != 0)

@@ -3,3 +3,4 @@
 pub mod random;
 pub mod sampling;
 pub mod sobol;
+pub mod spectrum;

@@ -84,16 +84,16 @@ pub fn sample_light(
     }
     let light = light_from_table(lights, [u[2], u[3]])?;
     let aim = to(light);
-    let (direction, pdf) = match sampling {
-        LightSampling::Cone => sample_cone(&aim, place)?,
-        LightSampling::Projected => {
-            let cap = cap_seen(&aim, vertex.normal);
-            if cap.area <= 0.0 {
-                return None;
-            }
-            let (direction, extent) = sample_cap(&cap, vertex.normal, place);
-            (direction, vertex.normal.dot(direction).max(0.0) / extent)
+    let cone = sampling == LightSampling::Cone || vertex.both_sides;
+    let (direction, pdf) = if cone {
+        sample_cone(&aim, place)?
+    } else {
+        let cap = cap_seen(&aim, vertex.normal);
+        if cap.area <= 0.0 {
+            return None;
         }
+        let (direction, extent) = sample_cap(&cap, vertex.normal, place);
+        (direction, vertex.normal.dot(direction).max(0.0) / extent)
     };
     (light.sphere != own).then(|| LightSample {
         wi: direction,
@@ -118,10 +118,15 @@ fn weighed_light(
     let mut v = u[2];
     for light in &lights.table {
         let cap = cap_seen(&to(light), vertex.normal);
+        let area = match vertex.both_sides {
+            true if cap.aim.outside => TAU * cone_height(&cap.aim),
+            true => 0.0,
+            false => cap.area,
+        };
         let strength = if light.sphere == own {
             0.0
         } else {
-            light.luminance * cap.area
+            light.luminance * area
         };
         total += strength;
         let share = if strength > 0.0 {
@@ -138,6 +143,18 @@ fn weighed_light(
     }
     let (light, cap, strength) = chosen?;
     let pdf_per_weight = 1.0 / total;
+    if vertex.both_sides {
+        let (direction, _) = sample_cone(&cap.aim, DVec2::new(u[0], u[1]))?;
+        let pdf = light.luminance * pdf_per_weight;
+        return Some(LightSample {
+            wi: direction,
+            pdf,
+            mis_pdf: pdf,
+            limb: limb_distance(&cap.aim, direction),
+            sphere: light.sphere,
+            pdf_per_weight,
+        });
+    }
     let (direction, extent) = sample_cap(&cap, vertex.normal, DVec2::new(u[0], u[1]));
     let cosine = vertex.normal.dot(direction).max(0.0);
     Some(LightSample {

@@ -1,5 +1,6 @@
 //! Twins of `shaders/scene/`.
 
+pub mod absorption;
 pub mod camera;
 pub mod priority;
 pub mod ray;

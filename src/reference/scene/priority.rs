@@ -18,11 +18,16 @@ pub fn relative_index(media: &Media, level: u32, ior: f64, inside: bool) -> f64 
     if inside { outer / ior } else { ior / outer }
 }
 
+/// What fills the space where the path is.
+#[must_use]
+pub fn filling(media: &Media) -> Option<&Medium> {
+    media.iter().max_by_key(|m| m.level)
+}
+
 /// Index of what the path is in.
 #[must_use]
 pub fn index_within(media: &Media) -> f64 {
-    let top = media.iter().max_by_key(|m| m.level);
-    top.map_or(1.0, |top| top.ior)
+    filling(media).map_or(1.0, |top| top.ior)
 }
 
 /// Whether the path is in the dielectric `sphere`.

@@ -36,6 +36,7 @@ pub struct Vertex {
     pub anchor: DVec3,
     pub offset: DVec3,
     pub normal: DVec3,
+    pub both_sides: bool,
 }
 
 /// The point where `ray` hits `sphere`.
@@ -54,6 +55,7 @@ pub fn vertex_at(ray: &Ray, hit: &Hit, sphere: &PlacedSphere) -> Vertex {
         anchor: sphere.anchor,
         offset,
         normal,
+        both_sides: false,
     }
 }
 

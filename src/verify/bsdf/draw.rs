@@ -7,6 +7,7 @@ use glam::DVec3;
 use super::Subjects;
 use crate::error::Result;
 use crate::gpu::bsdf_probe::{BsdfInput, Sampled};
+use crate::materials::dielectric::fresnel;
 use crate::materials::{Event, Surface};
 use crate::reference::core::sampling::basis_around;
 use crate::statistics::{mean_and_error, normal_p};
@@ -18,6 +19,9 @@ pub const ANGLES: [f64; 4] = [0.0, 45.0, 85.0, 89.9];
 /// Rings about the mirror direction, narrow ones for narrow lobes.
 const EDGES: [f64; 7] = [0.0, 1.0e-4, 1.0e-3, 1.0e-2, 0.1, 1.0, 2.0];
 const RINGS: usize = 5;
+
+/// Samples on a side of a surface that are too few for a test of where they are.
+const FEW: f64 = 1000.0;
 const SECTORS: usize = 20;
 
 /// Samples of one direction.
@@ -119,9 +123,44 @@ impl<'a> Draw<'a> {
         self.surface.eta
     }
 
-    fn cells(&self) -> Cells {
-        let mirrored = (-self.wo).reflect(self.surface.normal);
-        Cells::new(mirrored, &EDGES, RINGS, SECTORS)
+    /// The sides to which light is scattered: beyond the surface or not.
+    fn sides(&self) -> &'static [bool] {
+        match self.subjects.kinds[self.subject].is_translucent() {
+            true => &[false, true],
+            false => &[false],
+        }
+    }
+
+    /// Cells about the direction of smooth reflection, or beyond the surface of refraction.
+    fn cells(&self, beyond: bool) -> Cells {
+        let Surface { normal, eta } = self.surface;
+        let refraction = fresnel(self.cosine(), eta);
+        let axis = match beyond {
+            false => (-self.wo).reflect(normal),
+            true if refraction.reflected == 1.0 => -self.wo,
+            true => (self.cosine() / eta - refraction.cos_t) * normal - self.wo / eta,
+        };
+        Cells::new(axis, &EDGES, RINGS, SECTORS)
+    }
+
+    /// Integrals over all directions to which light is scattered; `f` is told whether one is beyond the surface.
+    fn integrals<const N: usize>(&self, f: impl Fn(DVec3, bool) -> [f64; N] + Sync) -> [f64; N] {
+        let mut sums = [0.0; N];
+        for beyond in self.sides() {
+            let there = |w: DVec3| {
+                if is_beyond(&self.surface, w) == *beyond {
+                    f(w, *beyond)
+                } else {
+                    [0.0; N]
+                }
+            };
+            for cell in self.cells(*beyond).integrals(there, 1.0e-7) {
+                for (sum, part) in sums.iter_mut().zip(cell) {
+                    *sum += part;
+                }
+            }
+        }
+        sums
     }
 
     /// Whether the samples follow the twin: directions its pdf, by chi-square over cells, and of delta lobes
@@ -145,20 +184,34 @@ impl<'a> Draw<'a> {
         }
     }
 
+    /// p-value of the directions on either side, those on the other side counting as ended.
     fn directions(&self, wrong: f64) -> f64 {
         let kind = &self.subjects.kinds[self.subject];
         let uniform = self.subjects.is_uniform(self.subject);
-        let below = |surface: &Surface, w: DVec3| !kind.transmits() && w.dot(surface.normal) <= 0.0;
         let surface = self.wrong_surface(wrong);
-        let directions = self.samples.iter().map(|s| {
-            let lost = kind.transmits() && s.weight().max_element() == 0.0;
-            (!lost && !below(&self.surface, s.wi())).then(|| s.wi())
-        });
-        self.cells().test(directions, |w| match uniform {
-            _ if below(&surface, w) => 0.0,
-            true => 1.0 / TAU,
-            false => kind.evaluate(&surface, self.wo, w).pdf,
-        })
+        let p = |beyond: &bool| {
+            let directions = self.samples.iter().map(|s| {
+                let lost = kind.transmits() && s.weight().max_element() == 0.0;
+                (!lost && is_beyond(&self.surface, s.wi()) == *beyond).then(|| s.wi())
+            });
+            let pdf = |w: DVec3| match uniform {
+                _ if is_beyond(&surface, w) != *beyond => 0.0,
+                true => 1.0 / TAU,
+                false => kind.evaluate(&surface, self.wo, w).pdf,
+            };
+            let cells = self.cells(*beyond);
+            // Hardly any on this side, as in total reflection, or where the index hardly changes: their number alone.
+            let count = directions.clone().flatten().count() as f64;
+            if count < FEW {
+                let [mass] = total(&cells.integrals(|w| [pdf(w)], 1.0e-8));
+                let mean = mass * self.samples.len() as f64;
+                return normal_p((count - mean) / mean.max(1.0).sqrt());
+            }
+            cells.test(directions, pdf)
+        };
+        let sides = self.sides();
+        let least = sides.iter().map(p).fold(1.0, f64::min);
+        (least * sides.len() as f64).min(1.0)
     }
 
     /// p-value of how often each event is chosen, the least of all events.
@@ -203,9 +256,10 @@ impl<'a> Draw<'a> {
         let integrals = if kind.is_delta() {
             self.twins_moment(1)
         } else {
-            let cells = self.cells();
-            let f = |w| kind.evaluate(&self.surface, self.wo, w).f_cos.to_array();
-            total(&cells.integrals(f, 1.0e-7))
+            self.integrals(|w, beyond| {
+                let scale = if beyond { self.eta() * self.eta() } else { 1.0 };
+                (scale * kind.evaluate(&self.surface, self.wo, w).f_cos).to_array()
+            })
         };
         Energy {
             drawn: drawn.map(|(mean, _)| mean),
@@ -227,31 +281,33 @@ impl<'a> Draw<'a> {
         (sum / self.samples.len() as f64).to_array()
     }
 
-    /// The k-th moments, for k from 1 to 4, of the weights of the lecture's uniform sampling or of a delta
-    /// lobe, by channel, each over the bound that the material says. 0 where the bound is.
+    /// The k-th moments, for k from 1 to 4, of the weights of the lecture's uniform sampling or, where that does not
+    /// sample, of the material's own, by channel, each over the bound that the material says. 0 where the bound is.
     #[must_use]
     pub fn moments(&self) -> [[f64; 3]; 4] {
         let kind = &self.subjects.kinds[self.subject];
         let bound = |k: usize, channel: usize| kind.moment(channel, k as i32 + 1);
         let over = |moment: f64, bound: f64| if moment == 0.0 { 0.0 } else { moment / bound };
-        if kind.is_delta() {
+        if !kind.form().is_hemispherical() {
             return std::array::from_fn(|k| {
                 let moment = self.twins_moment(k as i32 + 1);
                 std::array::from_fn(|c| over(moment[c], bound(k, c)))
             });
         }
         let bounds: [f64; 12] = std::array::from_fn(|i| bound(i / 3, i % 3));
-        let f = |w| -> [f64; 12] {
+        let all = self.integrals(|w, _| -> [f64; 12] {
             let f_cos = kind.evaluate(&self.surface, self.wo, w).f_cos;
-            let above = kind.transmits() || w.dot(self.surface.normal) > 0.0;
             std::array::from_fn(|i| {
-                let weight = if above { TAU * f_cos[i % 3] } else { 0.0 };
+                let weight = TAU * f_cos[i % 3];
                 over(weight.powi(i as i32 / 3 + 1) / TAU, bounds[i])
             })
-        };
-        let all = total(&self.cells().integrals(f, 1.0e-7));
+        });
         std::array::from_fn(|k| std::array::from_fn(|c| all[3 * k + c]))
     }
+}
+
+fn is_beyond(surface: &Surface, w: DVec3) -> bool {
+    w.dot(surface.normal) <= 0.0
 }
 
 /// What refraction takes out of a weight.

@@ -13,6 +13,7 @@ use glam::DVec3;
 use crate::error::Result;
 use crate::gpu::bsdf_probe::{BsdfInput, BsdfProbe, Evaluated, Sampled};
 use crate::gpu::device::Gpu;
+use crate::materials::dielectric::fresnel;
 use crate::materials::{ALL, BsdfSample, BsdfValue, MaterialKind, Surface, sample_uniform};
 use crate::settings::Integrator;
 use crate::verify::{Random, ULP};
@@ -56,7 +57,7 @@ impl Subjects {
     /// Whether they are sampled uniformly, but for delta lobes.
     #[must_use]
     pub fn is_uniform(&self, subject: usize) -> bool {
-        self.lecture && !self.kinds[subject].is_delta()
+        self.lecture && self.kinds[subject].form().is_hemispherical()
     }
 
     /// What the device makes of uniform numbers.
@@ -109,11 +110,18 @@ impl Subjects {
             .collect()
     }
 
-    /// The same with a direction as the last row, half of them near the mirror direction.
+    /// The same with a direction as the last row, half of them near the mirror direction or, every other one of
+    /// these where light is scattered through the surface, near the refracted one.
     fn directions(&self, random: &mut Random, subject: usize, count: usize) -> Vec<BsdfInput> {
         let mut inputs = self.questions(random, subject, count);
         for (i, input) in inputs.iter_mut().enumerate() {
-            let near = (-input.wo()).reflect(input.surface().normal);
+            let Surface { normal, eta } = input.surface();
+            let near = if self.kinds[subject].is_translucent() && i % 4 == 0 {
+                let cosine = normal.dot(input.wo()).clamp(0.0, 1.0);
+                (cosine / eta - fresnel(cosine, eta).cos_t) * normal - input.wo() / eta
+            } else {
+                (-input.wo()).reflect(normal)
+            };
             let wi = match i % 2 {
                 0 => near + random.magnitude(-3.0, 0.5) * random.direction(),
                 _ => random.direction(),
@@ -196,8 +204,16 @@ fn arrival(random: &mut Random, normal: DVec3, i: usize) -> DVec3 {
 }
 
 fn eta(random: &mut Random, kind: &MaterialKind, i: usize) -> f64 {
-    let choices = if kind.transmits() {
-        let ior = kind.ior();
+    let ior = kind.ior();
+    let choices = if kind.is_translucent() {
+        // At 1 there is no surface, next to it there is one.
+        [
+            ior,
+            1.0 / ior,
+            1.0 / random.range(0.5, 0.95),
+            random.range(0.4, 0.95),
+        ]
+    } else if kind.transmits() {
         [ior, 1.0 / ior, 1.0, random.range(0.4, 2.5)]
     } else {
         // In air, or in glass.

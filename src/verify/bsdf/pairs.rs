@@ -62,7 +62,7 @@ pub fn weights(
         .zip(samples)
         .filter(|(input, s)| {
             let above = s.wi().dot(input.surface().normal) > 0.0;
-            s.weight().max_element() > 0.0 && (above || transmits)
+            s.weight().max_element() > 0.0 && s.pdf > 0.0 && (above || transmits)
         })
         .map(|(input, s)| {
             let u = [s.wi[0], s.wi[1], s.wi[2], 0.0];
@@ -92,8 +92,8 @@ pub fn weights(
     Ok(agreement)
 }
 
-/// f(wo, wi) = f(wi, wo), for materials that neither transmit nor are delta lobes. `factor` on one of them,
-/// for companions.
+/// f(wo, wi) = f(wi, wo), and f(wo, wi) eta^2 = f(wi, wo) through the surface, where it is seen from the other side
+/// (Veach, thesis 1997, 5.2); for materials that are no delta lobes. `factor` on one of them, for companions.
 ///
 /// # Errors
 /// If the device fails.
@@ -106,13 +106,24 @@ pub fn reciprocity(
     let mut random = Random::new(&format!("reciprocity {subject}"));
     let mut there = subjects.directions(&mut random, subject, count);
     let cosine = |input: &BsdfInput| super::super::vector(input.u).dot(input.surface().normal);
-    there.retain(|input| cosine(input) > 1.0e-4);
+    let through = subjects.kinds[subject].is_translucent();
+    there.retain(|input| cosine(input) > 1.0e-4 || through && cosine(input) < -1.0e-4);
     let back: Vec<BsdfInput> = there
         .iter()
-        .map(|input| BsdfInput {
-            wo: [input.u[0], input.u[1], input.u[2]],
-            u: to_row(input.wo(), 0.0),
-            ..*input
+        .map(|input| {
+            let turned = BsdfInput {
+                wo: [input.u[0], input.u[1], input.u[2]],
+                u: to_row(input.wo(), 0.0),
+                ..*input
+            };
+            if cosine(input) > 0.0 {
+                return turned;
+            }
+            BsdfInput {
+                normal: input.normal.map(|x| -x),
+                eta: 1.0 / input.eta,
+                ..turned
+            }
         })
         .collect();
     let (forth, returned) = (subjects.evaluate(&there)?, subjects.evaluate(&back)?);
@@ -123,13 +134,19 @@ pub fn reciprocity(
         let [Some([one, _]), Some([other, _])] = allowed else {
             continue;
         };
+        let [cos_i, cos_o] = [there, back].map(|input| cosine(input).abs());
         // Both cosines are above 1e-4. Of a material that sends nothing there, 0 both ways counts.
         let sizes = [a, b].map(|e| f_cos(e).max_element());
         if sizes.iter().all(|size| *size < 1.0e4 * LEAST) && sizes != [0.0; 2] {
             continue;
         }
-        let [cos_i, cos_o] = [there, back].map(cosine);
-        let (f, g) = (f_cos(a) / cos_i, factor * f_cos(b) / cos_o);
+        let crossed = a.event & Event::TRANSMITTED.bits() != 0;
+        let scale = if crossed {
+            f64::from(there.eta).powi(2)
+        } else {
+            1.0
+        };
+        let (f, g) = (scale * f_cos(a) / cos_i, factor * f_cos(b) / cos_o);
         // The cosines here are those of the f32 numbers.
         let allowed = one + other + 4.0 * ULP * (1.0 / cos_i + 1.0 / cos_o);
         let off = relative((f - g).abs().max_element(), f.max_element());

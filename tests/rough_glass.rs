@@ -1,0 +1,175 @@
+//! Rough glass in scenes: all estimators have the same mean, lamps on any side of it and in it, clear or tinted, and
+//! where there is no surface there is none to be seen. (Its BSDF is tested as that of every material is.)
+
+use crate::common::{render_gpu, scene};
+use gpu_trace::film::Film;
+use gpu_trace::scene::Scene;
+use gpu_trace::settings::{Integrator, LightSampling, Settings};
+use gpu_trace::statistics::normal_limit;
+use gpu_trace::verify::{U, means, settings};
+
+/// Frosted glass, lamps, and a floor; the camera at `eye`.
+fn scene_with(eye: [f64; 3], spheres: &[(&str, [f64; 3], f64)]) -> Scene {
+    let mut text = format!(
+        "[camera]\nposition = {eye:?}\nlook_at = [0, 0, -0.1]\nfov = 40.0\n[image]\nwidth = 16\nheight = 16\n\
+         [environment]\nradiance = [0.1, 0.1, 0.1]\n\
+         [material.frosted]\ntype = \"dielectric\"\nior = 1.5\nroughness = 0.6\n\
+         [material.dense]\ntype = \"dielectric\"\nior = 1.8\nroughness = 0.5\n\
+         [material.tinted]\ntype = \"dielectric\"\nior = 1.5\nroughness = 0.6\nabsorption = [0.7, 0, 0]\n\
+         [material.clear]\ntype = \"dielectric\"\nior = 1.3\n\
+         [material.floor]\ntype = \"diffuse\"\nalbedo = [0.5, 0.5, 0.5]\n\
+         [material.lamp]\ntype = \"diffuse\"\nalbedo = [0, 0, 0]\nemission = [4, 4, 4]\n\
+         [[sphere]]\ncenter = [0, -101.2, 0]\nradius = 100\nmaterial = \"floor\"\n"
+    );
+    for (material, center, radius) in spheres {
+        text += &format!(
+            "[[sphere]]\ncenter = {center:?}\nradius = {radius}\nmaterial = \"{material}\"\n"
+        );
+    }
+    scene(&text)
+}
+
+const OUTSIDE: [f64; 3] = [0.0, 0.2, 4.0];
+
+fn situations() -> Vec<(&'static str, Scene)> {
+    let ball = ("frosted", [0.0, 0.0, 0.0], 1.0);
+    let mut many = vec![ball];
+    for i in 0..10 {
+        let angle = 0.63 * f64::from(i);
+        let place = [
+            2.0 * angle.cos(),
+            0.4 + 0.1 * f64::from(i),
+            2.0 * angle.sin(),
+        ];
+        many.push(("lamp", place, 0.3));
+    }
+    let behind = ("lamp", [0.6, 0.4, -2.5], 0.6);
+    vec![
+        ("behind", scene_with(OUTSIDE, &[ball, behind])),
+        (
+            "before",
+            scene_with(OUTSIDE, &[ball, ("lamp", [1.5, 2.0, 3.0], 0.6)]),
+        ),
+        (
+            "within",
+            scene_with(OUTSIDE, &[ball, ("lamp", [0.3, 0.1, 0.1], 0.3)]),
+        ),
+        (
+            "seen from within",
+            scene_with([0.0, 0.0, 0.6], &[ball, behind]),
+        ),
+        (
+            "across",
+            scene_with(OUTSIDE, &[ball, ("lamp", [0.8, 0.4, 0.2], 0.5)]),
+        ),
+        (
+            "nested",
+            scene_with(
+                OUTSIDE,
+                &[
+                    ("clear", [0.0, 0.0, 0.0], 1.1),
+                    ("dense", [0.1, 0.0, 0.0], 0.8),
+                    ("frosted", [0.6, 0.3, 0.2], 0.5),
+                    ("lamp", [0.0, 0.1, 0.1], 0.3),
+                ],
+            ),
+        ),
+        ("many lamps", scene_with(OUTSIDE, &many)),
+        (
+            "tinted",
+            scene_with(
+                OUTSIDE,
+                &[
+                    ("tinted", [0.0, 0.0, 0.0], 1.0),
+                    ("clear", [0.6, 0.3, 0.2], 0.5),
+                    ("lamp", [-0.2, 0.1, 0.1], 0.3),
+                    ("floor", [0.2, -0.5, 0.1], 0.3),
+                ],
+            ),
+        ),
+    ]
+}
+
+/// The mean of an image and its standard error.
+fn mean(film: &Film) -> [f64; 2] {
+    assert_eq!(film.tally().non_finite, 0);
+    let pixels = film.rect().pixels();
+    let variance = |i| film.variance_of_mean(i).expect("16 batches")[0];
+    let sum: f64 = (0..pixels).map(|i| film.mean(i)[0]).sum();
+    let error: f64 = (0..pixels).map(variance).sum::<f64>().sqrt();
+    [sum, error].map(|x| x / pixels as f64)
+}
+
+#[test]
+fn lamps_are_found_on_both_sides() {
+    const SPP: u64 = 1024;
+    let mut apart = Vec::new();
+    for (name, scene) in situations() {
+        let base = settings(&scene, 16, 16, SPP);
+        let with = |integrator, light_sampling, factor| {
+            let settings = Settings {
+                integrator,
+                light_sampling,
+                samples: 0..SPP * factor,
+                seed: factor,
+                ..base.clone()
+            };
+            mean(&render_gpu(&scene, &settings))
+        };
+        // Without light sampling: what it must not change.
+        let [truth, error] = with(Integrator::Bsdf, LightSampling::Projected, 16);
+        for (integrator, light_sampling) in [
+            (Integrator::Path, LightSampling::Projected),
+            (Integrator::Path, LightSampling::Cone),
+            (Integrator::Nee, LightSampling::Projected),
+            (
+                Integrator::Lecture { termination: 0.2 },
+                LightSampling::Projected,
+            ),
+        ] {
+            let [found, own] = with(integrator, light_sampling, 4);
+            let both = error.hypot(own);
+            let z = (found - truth) / both;
+            let name = format!("{name}, {} {}", integrator.name(), light_sampling.name());
+            eprintln!(
+                "{name}: {found:.5}, z = {z:.2}, error {:.3} %",
+                100.0 * both / truth
+            );
+            apart.push((name, z, 0.02 * truth / both));
+        }
+    }
+    let limit = normal_limit(apart.len());
+    let failed: Vec<_> = apart.iter().filter(|(_, z, _)| z.abs() > limit).collect();
+    assert!(failed.is_empty(), "beyond {limit}: {failed:?}");
+    // Power: 2 % of the light is found missing in most of them.
+    let found = apart.iter().filter(|(.., shift)| *shift > 2.0 * limit);
+    assert!(4 * found.count() >= 3 * apart.len(), "{apart:?}");
+}
+
+/// The largest deviation from 1 of a glass ball with a rough one of this index in it, in an environment of 1.
+fn off_white(ior: f64, priority: i32) -> f64 {
+    let scene = scene(&format!(
+        "[camera]\nposition = [0, 0, 4]\nlook_at = [0, 0, 0]\nfov = 36.0\n[image]\nwidth = 32\nheight = 32\n\
+         [environment]\nradiance = [1, 1, 1]\n[material.outer]\ntype = \"dielectric\"\nior = 1.5\n\
+         [material.inner]\ntype = \"dielectric\"\nroughness = 0.7\nior = {ior}\n\
+         [[sphere]]\ncenter = [0, 0, 0]\nradius = 1\nmaterial = \"outer\"\npriority = 1\n\
+         [[sphere]]\ncenter = [0.2, 0, 0]\nradius = 0.5\nmaterial = \"inner\"\npriority = {priority}\n"
+    ));
+    let film = render_gpu(&scene, &settings(&scene, 32, 32, 64));
+    assert_eq!(film.tally().non_finite, 0);
+    let off = means(&film).into_iter().map(|m| (m - 1.0).abs());
+    off.fold(0.0, f64::max)
+}
+
+#[test]
+fn where_there_is_no_surface_none_is_seen() {
+    // Smooth glass loses nothing, rough glass what its microfacets shadow: so it shows if it is there. Within glass of
+    // the same index, and where glass of higher precedence hides it, it is not. Tolerance as in furnace.rs.
+    let tolerance = 64.0 * 16.0 * U;
+    for (ior, priority) in [(1.5, 2), (1.4, 0)] {
+        let off = off_white(ior, priority);
+        assert!(off <= tolerance, "index {ior}: off by {off:e}");
+    }
+    // Companion: one that is there.
+    assert!(off_white(1.4, 2) > 1.0e-2);
+}
