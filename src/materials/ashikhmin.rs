@@ -126,14 +126,16 @@ impl Ashikhmin {
         self.diffuse * (1.0 - self.specular)
     }
 
-    fn share_of_half_vectors(&self, cos_o: f64) -> f64 {
+    fn shares(&self, cos_o: f64) -> [f64; 2] {
         let glossy = luminance(self.reflectance(cos_o));
-        let total = glossy + luminance(self.below()) * away_from_grazing(cos_o);
-        let narrow = 1.0 - 1.0 / (1.0 + (self.sharpness() / 6.0).powi(3));
+        let dull = luminance(self.below()) * away_from_grazing(cos_o);
+        let total = glossy + dull;
+        let sharp = (self.sharpness() / 6.0).powi(3);
+        let wide = glossy / (1.0 + sharp);
         if total > 0.0 {
-            narrow * glossy / total
+            [sharp * wide / total, (dull + wide) / total]
         } else {
-            0.0
+            [0.0, 1.0]
         }
     }
 
@@ -143,11 +145,11 @@ impl Ashikhmin {
         let glossy = quarter * cos_i / cos_i.max(cos_o) * self.reflectance(pair.cos_h);
         let dull = 28.0 / 23.0 * FRAC_1_PI * cos_i;
         let dull = dull * away_from_grazing(cos_i) * away_from_grazing(cos_o);
-        let q = self.share_of_half_vectors(cos_o);
+        let [half_vectors, cosine] = self.shares(cos_o);
         Lobes {
             diffuse: dull * self.below(),
             glossy,
-            pdf: q * quarter + (1.0 - q) * cos_i * FRAC_1_PI,
+            pdf: half_vectors * quarter + cosine * cos_i * FRAC_1_PI,
         }
     }
 }
@@ -200,7 +202,7 @@ impl Bsdf for Ashikhmin {
     fn sample(&self, surface: &Surface, wo: DVec3, u: [f64; 4]) -> BsdfSample {
         let frame = self.frame(surface);
         let (o, place) = (arrival(&frame, wo), DVec2::new(u[0], u[1]));
-        let pair = if u[2] < self.share_of_half_vectors(o.z) {
+        let pair = if u[2] < self.shares(o.z)[0] {
             Pair::about(o, self.half_vector(place))
         } else {
             Pair::between(o, cosine_direction(DVec3::Z, place))

@@ -213,8 +213,8 @@ fn coat_reflectance(schlick_h: f64) -> f64 {
     mix(0.04, 1.0, schlick_h)
 }
 
-/// The shares of microfacets and of the clearcoat, of which the rest is the cosine's.
-type Shares = [f64; 2];
+/// The shares of microfacets, of the clearcoat and of the cosine.
+type Shares = [f64; 3];
 
 impl Disney {
     fn alpha(&self) -> DVec2 {
@@ -291,13 +291,14 @@ impl Disney {
         let coat = 4.0 * self.coat() * coat_reflectance(fresnel) * lit * lit;
         let total = self.diffuse_weight() + specular + coat;
         if total > 0.0 {
-            [(1.0 - self.cosine_share()) * specular / total, coat / total]
+            let wide = self.cosine_share() * specular;
+            [specular - wide, coat, self.diffuse_weight() + wide].map(|weight| weight / total)
         } else {
-            [0.0; 2]
+            [0.0, 0.0, 1.0]
         }
     }
 
-    fn lobes(&self, pair: &Pair, [specular_share, coat_share]: Shares) -> Lobes {
+    fn lobes(&self, pair: &Pair, [specular_share, coat_share, cosine_share]: Shares) -> Lobes {
         let Pair { o, i, h, cos_h } = *pair;
         let (fresnel_o, fresnel_i, fresnel_h) = (schlick(o.z), schlick(i.z), schlick(cos_h));
         let retro = cos_h * cos_h * self.roughness;
@@ -315,7 +316,7 @@ impl Disney {
         Lobes {
             diffuse: i.z * diffuse,
             glossy: i.z * (specular + coat),
-            pdf: (1.0 - specular_share - coat_share) * i.z * FRAC_1_PI
+            pdf: cosine_share * i.z * FRAC_1_PI
                 + specular_share * ggx_pdf(o, h, alpha)
                 + coat_share * 0.25 * d * h.z / cos_h,
         }

@@ -187,14 +187,18 @@ impl Nylon {
         ((x * (2.0 - x)).sqrt() * circle_point(u.y)).extend(1.0 - x)
     }
 
-    fn share_of_half_vectors(&self, cos_o: f64) -> f64 {
+    fn shares(&self, cos_o: f64) -> [f64; 2] {
         let glossy = self.glossy_weight() * reflectance(cos_o, self.ior);
         let total = glossy + luminance(self.diffuse);
-        let wide = 6.0 * self.norm();
+        let wide = (6.0 * self.norm()).powi(3);
+        let narrow = glossy / (1.0 + wide);
         if total > 0.0 {
-            glossy / (total * (1.0 + wide.powi(3)))
+            [
+                narrow / total,
+                (luminance(self.diffuse) + wide * narrow) / total,
+            ]
         } else {
-            0.0
+            [0.0, 1.0]
         }
     }
 
@@ -209,11 +213,11 @@ impl Nylon {
         let d = self.abc(pair.h);
         let reflected = reflectance(pair.cos_h, self.ior);
         let dull = pair.i.z * FRAC_1_PI;
-        let q = self.share_of_half_vectors(pair.o.z);
+        let [half_vectors, cosine] = self.shares(pair.o.z);
         Lobes {
             diffuse: dull * self.diffuse,
             glossy: reflected * d * lit / larger * dull * self.a,
-            pdf: q * 0.125 * FRAC_1_PI * d / (self.norm() * pair.cos_h) + (1.0 - q) * dull,
+            pdf: half_vectors * 0.125 * FRAC_1_PI * d / (self.norm() * pair.cos_h) + cosine * dull,
         }
     }
 }
@@ -265,7 +269,7 @@ impl Bsdf for Nylon {
     fn sample(&self, surface: &Surface, wo: DVec3, u: [f64; 4]) -> BsdfSample {
         let frame = Frame::about(surface.normal, DVec3::Y);
         let (o, place) = (arrival(&frame, wo), DVec2::new(u[0], u[1]));
-        let pair = if u[2] < self.share_of_half_vectors(o.z) {
+        let pair = if u[2] < self.shares(o.z)[0] {
             Pair::about(o, self.abc_normal(place))
         } else {
             Pair::between(o, cosine_direction(DVec3::Z, place))
