@@ -71,7 +71,7 @@ impl Lobes {
                 event: Event::GLOSSY,
             };
         }
-        let wide = luminance(self.glossy) <= luminance(self.diffuse);
+        let wide = luminance(self.glossy) < luminance(self.diffuse);
         BsdfValue {
             f_cos: self.diffuse + self.glossy,
             pdf: self.pdf,
