@@ -29,18 +29,16 @@ fn each(subjects: &Subjects) -> impl Iterator<Item = (usize, String)> + '_ {
     kinds.map(|(i, kind)| (i, format!("case {i}, {}", kind.name())))
 }
 
-/// Fails unless the device agrees with the twin, at most 5 % of the cases being on edges: glass that is
-/// as dense as what is around it reflects all grazing light or none.
+/// Fails unless the device agrees with the twin, at most a fifth of the cases being on edges: glass that is
+/// as dense as what is around it reflects all grazing light or none, and where a value falls as a high power of a
+/// sine or a cosine, as those of cloth do about the half vector, rounded directions say little of what is left of it.
 fn assert_agrees(name: &str, compared: &Compared) {
     eprint!(
         "{name}: {} of {} on an edge; ",
         compared.edges, compared.cases
     );
     compared.agreement.assert_holds(compared.cases);
-    assert!(
-        20 * compared.edges <= compared.cases,
-        "{name}: {compared:?}"
-    );
+    assert!(5 * compared.edges <= compared.cases, "{name}: {compared:?}");
 }
 
 #[test]

@@ -52,6 +52,21 @@ impl Cells {
         }
     }
 
+    /// The same with a border of sectors in the half plane of `direction` from the axis: what lies there as a streak,
+    /// thinner than a sector, is then met by the quadrature.
+    #[must_use]
+    pub fn with_border(mut self, direction: DVec3) -> Self {
+        /// Sines of angles between the two that are rounding.
+        const LEAST: f64 = 1.0e-8;
+        let axis = self.axes[2];
+        let across = axis.cross(direction);
+        if across.length() > LEAST * direction.length() {
+            let bitangent = across.normalize();
+            self.axes = [bitangent.cross(axis), bitangent, axis];
+        }
+        self
+    }
+
     /// How many there are.
     #[must_use]
     pub fn count(&self) -> usize {

@@ -140,7 +140,8 @@ impl<'a> Draw<'a> {
             true if refraction.reflected == 1.0 => -self.wo,
             true => (self.cosine() / eta - refraction.cos_t) * normal - self.wo / eta,
         };
-        Cells::new(axis, &EDGES, RINGS, SECTORS)
+        // Near grazing incidence lobes are streaks in its plane.
+        Cells::new(axis, &EDGES, RINGS, SECTORS).with_border(normal)
     }
 
     /// Integrals over all directions to which light is scattered; `f` is told whether one is beyond the surface.
