@@ -45,7 +45,7 @@ pub struct Trajectory {
 #[derive(Debug)]
 enum Source {
     /// A particle file without a scene file.
-    Movie(Movie),
+    Movie(Box<Movie>),
     /// A scene file, as it was typed.
     Scene(Option<String>),
 }
@@ -63,7 +63,7 @@ impl Trajectory {
             .filter(|path| Format::of_path(path).is_some());
         if let Some(path) = particles {
             let (movie, frames) = Movie::open(path, look, |there| frames.of(there))?;
-            let source = Source::Movie(movie);
+            let source = Source::Movie(Box::new(movie));
             return Ok(Self { frames, source });
         }
         let loaded = builtin::resolve_as(argument, look, Some(frames.first))?;
