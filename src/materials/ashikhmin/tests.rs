@@ -36,16 +36,14 @@ fn paper(material: &Ashikhmin, k1: DVec3, k2: DVec3) -> DVec3 {
         material.specular,
         material.diffuse,
     );
-    let exponent =
-        (nu * h.dot(u).powi(2) + nv * h.dot(v).powi(2)) / (1.0 - h.dot(n).powi(2));
+    let exponent = (nu * h.dot(u).powi(2) + nv * h.dot(v).powi(2)) / (1.0 - h.dot(n).powi(2));
     let fresnel = rs + (1.0 - rs) * (1.0 - k1.dot(h)).powi(5);
     let specular = ((nu + 1.0) * (nv + 1.0)).sqrt() / (8.0 * std::f64::consts::PI)
         * n.dot(h).powf(exponent)
         / (h.dot(k1) * n.dot(k1).max(n.dot(k2)))
         * fresnel;
     let edge = |k: DVec3| 1.0 - (1.0 - n.dot(k) / 2.0).powi(5);
-    let diffuse =
-        28.0 * rd / (23.0 * std::f64::consts::PI) * (1.0 - rs) * edge(k1) * edge(k2);
+    let diffuse = 28.0 * rd / (23.0 * std::f64::consts::PI) * (1.0 - rs) * edge(k1) * edge(k2);
     specular + diffuse
 }
 
@@ -85,7 +83,13 @@ fn at_the_normal_the_exponent_is_nothing() {
 fn what_the_lobe_adds_the_diffuse_term_has_left() {
     // B of `albedo`: the lobe of nothing but Schlick's fifth power.
     let mut least = 1.0f64;
-    for (nu, nv) in [(0.0, 0.0), (0.0, 30.0), (3.0, 3.0), (20.0, 1.0e3), (1.0e4, 1.0e4)] {
+    for (nu, nv) in [
+        (0.0, 0.0),
+        (0.0, 30.0),
+        (3.0, 3.0),
+        (20.0, 1.0e3),
+        (1.0e4, 1.0e4),
+    ] {
         let lobe = plain(0.0, 0.0, nu, nv);
         for degrees in [0.0, 30.0, 60.0, 75.0, 85.0, 89.0] {
             for turn in [0.0, 0.8, 1.57] {

@@ -56,7 +56,10 @@ fn the_most_that_is_scattered_is_known() {
         let bound = material.albedo().x;
         for degrees in [0.0, 40.0, 70.0, 80.0, 85.0, 87.0, 89.0, 89.9] {
             let found = albedo(&material, direction(degrees, 0.3));
-            assert!(found <= bound, "{material:?}, {degrees}: {found} of {bound}");
+            assert!(
+                found <= bound,
+                "{material:?}, {degrees}: {found} of {bound}"
+            );
             lower = lower.max(found / bound);
         }
     }

@@ -43,7 +43,10 @@ fn along_the_surface_it_scatters_most() {
         for degrees in [0.0, 20.0, 45.0, 70.0, 80.0, 85.0, 88.0, 89.0, 89.9, 89.999] {
             let found = albedo(&material, direction(degrees, 0.3));
             assert!(found > before, "{roughness}, {degrees}: {found}");
-            assert!(found <= material.albedo().x, "{roughness}, {degrees}: {found}");
+            assert!(
+                found <= material.albedo().x,
+                "{roughness}, {degrees}: {found}"
+            );
             before = found;
         }
         // Companion: it comes that far.
