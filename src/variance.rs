@@ -166,8 +166,13 @@ fn worst_cycle(scene: &Scene, placement: &Placement, k: i32, termination: f64) -
         {
             let mut materials = vec![first.material, second.material];
             materials.dedup();
+            // What reflects nothing ends any growth, even one without bound.
+            let product = match second.factor {
+                0.0 => 0.0,
+                factor => first.factor * factor,
+            };
             cycles.push(Cycle {
-                factor: (first.factor * second.factor).sqrt(),
+                factor: product.sqrt(),
                 materials,
                 channel,
             });
@@ -208,11 +213,15 @@ impl Cycle {
         } else {
             "no --termination is low enough: use --integrator bsdf".into()
         };
+        let growth = if self.factor.is_finite() {
+            format!("by a factor of up to {:.3}", self.factor)
+        } else {
+            "without bound".into()
+        };
         format!(
             "{says}: with --integrator lecture and a probability of termination of {termination}, \
-             the mean {square} of a path's weight grows by a factor of up to {:.3} at every event \
+             the mean {square} of a path's weight grows {growth} at every event \
              between surfaces of {between}; {lower}",
-            self.factor,
         )
     }
 }

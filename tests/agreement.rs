@@ -136,6 +136,7 @@ fn perturbed(scene: &Scene, factor: f64) -> Scene {
             MaterialKind::Dielectric(m) => m.ior = 1.0 + factor * (m.ior - 1.0),
             MaterialKind::Reflective(m) => m.albedo *= factor,
             MaterialKind::Conductor(m) => m.k = m.k.map(|k| factor * k),
+            MaterialKind::CarPaint(m) => m.diffuse = m.diffuse.map(|kd| factor * kd),
         }
     }
     scene

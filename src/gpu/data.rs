@@ -7,7 +7,9 @@ use crate::bvh::WIDTH;
 use crate::effects::{Effect, Effects};
 use crate::error::{Error, Result};
 use crate::gpu::engine::{Pass, Recording};
-use crate::gpu::layout::{LightRecord, MaterialRecord, PoleRecord, SphereRecord, light_weight};
+use crate::gpu::layout::{
+    LightRecord, MaterialRecord, PoleRecord, SphereRecord, anchored_spheres, light_weight,
+};
 use crate::materials::Member;
 use crate::placement::Placement;
 use crate::placement::containment::MOST_CORES;
@@ -105,7 +107,7 @@ fn scene_data(
         let array = match name.as_str() {
             "spheres" => spheres(placement),
             "poles" => poles(placement),
-            "attributes" => attributes(placement, effects),
+            "attributes" => attributes(scene, placement, effects),
             "materials" => materials(kernel, scene, placement, effects),
             "lights" => lights(kernel, placement, effects),
             other => unreachable!("no scene data {other}"),
@@ -130,10 +132,14 @@ fn poles(placement: &Placement) -> Vec<u8> {
     bytes_of(poles.filter_map(|s| Some(PoleRecord::new(s, s.pole?))))
 }
 
-fn attributes(placement: &Placement, effects: &Effects) -> Vec<u8> {
+fn attributes(scene: &Scene, placement: &Placement, effects: &Effects) -> Vec<u8> {
     let mut words: Vec<u32> = Vec::new();
+    let mut anchored = anchored_spheres(scene, placement)
+        .zip(scene.materials.len()..)
+        .peekable();
     for (index, sphere) in placement.spheres.iter().enumerate() {
-        words.push(sphere.material as u32);
+        let own = anchored.next_if(|(i, _)| *i == index);
+        words.push(own.map_or(sphere.material, |(_, record)| record) as u32);
         if effects.has(Effect::Interior) {
             words.push(sphere.side as u32);
         }
@@ -163,10 +169,14 @@ fn materials(kernel: &Kernel, scene: &Scene, placement: &Placement, effects: &Ef
     let members: Vec<(Member, u32)> = std::iter::zip(material_members(effects), offsets)
         .map(|(member, (_, offset))| (member, offset))
         .collect();
-    let record = |m| MaterialRecord::new(m, placement.radiance_scale);
     let materials = scene.materials.iter();
-    materials
-        .flat_map(|m| record(m).bytes(&members, size))
+    let materials = materials.map(|m| MaterialRecord::new(m, placement.radiance_scale));
+    let anchored = anchored_spheres(scene, placement);
+    let anchored =
+        anchored.map(|i| MaterialRecord::of_sphere(&placement.spheres[i], scene, placement));
+    let records = materials.chain(anchored);
+    records
+        .flat_map(|record| record.bytes(&members, size))
         .collect()
 }
 

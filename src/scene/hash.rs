@@ -94,9 +94,21 @@ impl Fnv {
     fn kind(&mut self, kind: &MaterialKind) {
         self.bytes(kind.name().as_bytes());
         for (_, value) in kind.parameters() {
-            match value {
-                Value::Number(number) => self.number(number),
-                Value::Vector(vector) => self.vector(vector),
+            self.value(value);
+        }
+    }
+
+    fn value(&mut self, value: Value) {
+        match value {
+            Value::Number(number) => self.number(number),
+            Value::Vector(vector) => self.vector(vector),
+            Value::Vectors(vectors) => vectors.into_iter().for_each(|v| self.vector(v)),
+            // Tables may be left out: their keys say which there are.
+            Value::Table(values) => {
+                for (key, value) in values {
+                    self.bytes(key.as_bytes());
+                    self.value(value);
+                }
             }
         }
     }
@@ -116,11 +128,13 @@ mod tests {
         material.matte = { type = "diffuse", albedo = [0.1, 0.2, 0.3] }
         material.shiny = { type = "reflective", albedo = [0.1, 0.2, 0.3], specular = [1, 1, 1], epsilon = 0.01, mu = 9 }
         material.chrome = { type = "mirror", reflectance = [0.1, 0.2, 0.3] }
+        material.sprayed = { type = "car-paint", preset = "polaris-silber", m = [0.3, 0.2, 0.1], clearcoat = { ior = 1.5 } }
         sphere = [
             { center = [0, 0, 0], radius = 1, material = "glass", priority = 0 },
             { center = [3, 0, 0], radius = 1, material = "matte" },
             { center = [6, 0, 0], radius = 1, material = "shiny" },
             { center = [9, 0, 0], radius = 1, material = "chrome" },
+            { center = [12, 0, 0], radius = 1, material = "sprayed" },
         ]
     "#;
 
@@ -143,6 +157,7 @@ mod tests {
             MaterialKind::Dielectric(m) => m.ior += 1e-9,
             MaterialKind::Reflective(m) => m.mu += 1.0,
             MaterialKind::Conductor(m) => m.roughness += 0.1,
+            MaterialKind::CarPaint(m) => m.m = None,
         };
         let changes: [fn(&mut Scene); 14] = [
             |scene| scene.camera.position.x = 1e-300,
@@ -166,7 +181,7 @@ mod tests {
             alter(&mut scene);
             hashes.push(content_hash(&scene));
         }
-        for index in 0..4 {
+        for index in 0..5 {
             let mut scene = scene();
             change(&mut scene.materials[index].kind);
             hashes.push(content_hash(&scene));

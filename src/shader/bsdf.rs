@@ -18,7 +18,11 @@ pub fn members(effects: &Effects) -> Vec<Member> {
         own.push(Member::vector("emission"));
     }
     for (_, form) in effects.forms() {
-        for member in form.members {
+        let anchored = match effects.has(Effect::Pole) {
+            true => form.anchored,
+            false => &[],
+        };
+        for member in form.members.iter().chain(anchored) {
             if !own.contains(member) {
                 own.push(*member);
             }
@@ -41,15 +45,23 @@ pub(super) fn module(effects: &Effects) -> String {
     let forms: Vec<(u32, &Form)> = effects.forms().collect();
     let mut text =
         String::from("import package::materials::contract::{Surface, BsdfSample, BsdfValue};\n");
-    let uniform = effects.has(Effect::Lecture) && forms.iter().any(|(_, form)| !form.delta);
-    if uniform {
-        text += "import package::materials::uniform::sample_uniform;\n";
+    let uniform = effects.has(Effect::Lecture);
+    for (name, used) in [
+        ("sample_uniform", is_plain as fn(&Form) -> bool),
+        ("sample_beside", |form| form.part_delta),
+    ] {
+        if uniform && forms.iter().any(|(_, form)| used(form)) {
+            let _ = writeln!(text, "import package::materials::uniform::{name};");
+        }
     }
     for (_, form) in &forms {
         let (name, module) = (form.name, form.material.replace('-', "_"));
         // Writing to a String cannot fail.
-        if form.delta || !uniform {
+        if !(uniform && is_plain(form)) {
             let _ = writeln!(text, "import package::materials::{module}::sample_{name};");
+        }
+        if uniform && form.part_delta {
+            let _ = writeln!(text, "import package::materials::{module}::share_{name};");
         }
         if !form.delta {
             let _ = writeln!(
@@ -70,13 +82,7 @@ pub(super) fn module(effects: &Effects) -> String {
     text += "}\n";
     let sampled: Vec<(u32, String)> = forms
         .iter()
-        .map(|(code, form)| match form.delta || !uniform {
-            true => (
-                *code,
-                format!("return sample_{}(surface, wo, u);", form.name),
-            ),
-            false => (*code, "return sample_uniform(surface, wo, u);".into()),
-        })
+        .map(|(code, form)| (*code, sampled_by(form, uniform)))
         .collect();
     let evaluated: Vec<(u32, String)> = forms
         .iter()
@@ -104,6 +110,25 @@ pub(super) fn module(effects: &Effects) -> String {
     text += &predicate("is_delta", &forms, |form| form.delta);
     text += &predicate("transmits", &forms, |form| form.transmits);
     text
+}
+
+/// Whether it has no delta lobe.
+fn is_plain(form: &Form) -> bool {
+    !form.delta && !form.part_delta
+}
+
+/// How a form is sampled; `uniform`: by the lecture's integrator.
+fn sampled_by(form: &Form, uniform: bool) -> String {
+    let name = form.name;
+    let own = format!("return sample_{name}(surface, wo, u);");
+    match (uniform, is_plain(form), form.part_delta) {
+        (true, true, _) => "return sample_uniform(surface, wo, u);".into(),
+        (true, _, true) => format!(
+            "let share = share_{name}(surface, wo);\nif u.z < share {{ {own} }}\n\
+             return sample_beside(surface, wo, u, share);"
+        ),
+        _ => own,
+    }
 }
 
 /// A function that says whether a material's form is such a one.

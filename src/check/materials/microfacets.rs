@@ -30,6 +30,7 @@ pub(super) fn grazing(context: &Context) -> Result<Measure> {
     let surface = Surface {
         normal: DVec3::Z,
         eta: 1.0,
+        offset: DVec3::ZERO,
     };
     let mut inputs = Vec::new();
     while inputs.len() < context.size(50_000, 500_000) {

@@ -103,8 +103,16 @@ impl Subjects {
             .map(|i| {
                 let normal = normal(random, i);
                 let wo = arrival(random, normal, i);
-                let eta = eta(random, kind, i);
-                BsdfInput::new(subject, &Surface { normal, eta }, wo, random.unit4())
+                let surface = Surface {
+                    normal,
+                    eta: eta(random, kind, i),
+                    // On a ball; nothing is drawn where nothing looks.
+                    offset: match kind.form().offset {
+                        true => random.direction(),
+                        false => DVec3::ZERO,
+                    },
+                };
+                BsdfInput::new(subject, &surface, wo, random.unit4())
             })
             .collect()
     }
@@ -148,10 +156,15 @@ impl Question {
             (DVec3::new(x, y, z), w)
         };
         let ((normal, eta), (wo, w), (u, _)) = (off(), off(), off());
+        let offset = match self.surface.offset == DVec3::ZERO {
+            true => DVec3::ZERO,
+            false => off().0,
+        };
         Self {
             surface: Surface {
                 normal: self.surface.normal + normal,
                 eta: self.surface.eta * (1.0 + eta),
+                offset: self.surface.offset + offset,
             },
             wo: self.wo + wo,
             u: [

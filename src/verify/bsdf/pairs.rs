@@ -58,7 +58,9 @@ pub fn weights(
         .zip(samples)
         .filter(|(input, s)| {
             let above = s.wi().dot(input.surface().normal) > 0.0;
-            s.weight().max_element() > 0.0 && (above || transmits)
+            // What went into a delta lobe beside others has no value.
+            let delta = s.event & Event::DELTA.bits() != 0;
+            s.weight().max_element() > 0.0 && (above || transmits) && !delta
         })
         .map(|(input, s)| {
             let u = [s.wi[0], s.wi[1], s.wi[2], 0.0];
@@ -117,6 +119,10 @@ pub fn reciprocity(
         };
         let [cos_i, cos_o] = [there, back].map(cosine);
         let (f, g) = (f_cos(a) / cos_i, factor * f_cos(b) / cos_o);
+        // Below f32's smallest normal number there may be nothing left.
+        if f.max_element().max(g.max_element()) < 1.0e-32 {
+            continue;
+        }
         // The cosines here are those of the f32 numbers.
         let allowed = one + other + 4.0 * ULP * (1.0 / cos_i + 1.0 / cos_o);
         let off = relative((f - g).abs().max_element(), f.max_element());
