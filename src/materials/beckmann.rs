@@ -23,13 +23,32 @@ pub struct Facets {
     pub both: f64,
 }
 
+/// The direction halfway between two, and its cosine with either.
+#[derive(Clone, Copy, Debug)]
+pub struct Halfway {
+    /// The direction.
+    pub h: DVec3,
+    /// The cosine.
+    pub oh: f64,
+}
+
+impl Halfway {
+    /// That between wo and wi.
+    #[must_use]
+    pub fn between(wo: DVec3, wi: DVec3) -> Self {
+        let sum = wo + wi;
+        Self {
+            h: sum.normalize(),
+            oh: 0.5 * sum.length(),
+        }
+    }
+}
+
 impl Facets {
     /// Those about `normal`; `cos_o`: of wo with it.
     #[must_use]
-    pub fn about(normal: DVec3, wo: DVec3, cos_o: f64, wi: DVec3) -> Self {
-        let sum = wo + wi;
-        let h = sum.normalize();
-        let oh = 0.5 * sum.length();
+    pub fn about(normal: DVec3, cos_o: f64, wi: DVec3, between: Halfway) -> Self {
+        let Halfway { h, oh } = between;
         let cos_i = normal.dot(wi);
         let cos_h = normal.dot(h).max(LEAST_COS);
         let double_o = 2.0 * cos_h * cos_o;

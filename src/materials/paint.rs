@@ -3,9 +3,9 @@
 
 use std::f64::consts::PI;
 
-use glam::{DVec2, DVec3};
+use glam::{DMat3, DVec2, DVec3};
 
-use super::beckmann::{Facets, beckmann_normal};
+use super::beckmann::{Facets, Halfway, beckmann_normal};
 use super::{BsdfSample, BsdfValue, Event};
 use crate::reference::core::sampling::{basis_around, cosine_direction};
 
@@ -56,17 +56,16 @@ fn shares_of(strengths: [f64; 4]) -> [f64; 4] {
     }
 }
 
-/// A direction about visible normals.
-fn lobe_direction(normal: DVec3, m: f64, wo: DVec3, u: DVec2, v: f64) -> DVec3 {
+/// A direction about visible normals, and the facet that reflects it.
+fn reflection(normal: DVec3, m: f64, wo: DVec3, u: DVec2, v: f64) -> (DVec3, Halfway) {
     let basis = basis_around(normal);
-    let o = DVec3::new(
-        wo.dot(basis.tangent),
-        wo.dot(basis.bitangent),
-        wo.dot(normal).max(0.0),
-    );
+    let frame = DMat3::from_cols(basis.tangent, basis.bitangent, normal);
+    let mut o = frame.transpose() * wo;
+    o.z = o.z.max(0.0);
     let h = beckmann_normal(o, m, u, v);
-    let i = 2.0 * o.dot(h) * h - o;
-    (i.x * basis.tangent + i.y * basis.bitangent + i.z * normal).normalize()
+    let oh = o.dot(h);
+    let wi = (frame * (2.0 * oh * h - o)).normalize();
+    (wi, Halfway { h: frame * h, oh })
 }
 
 /// The mean weight of samples over a grid of uniform numbers, to some 1e-3, for light that arrives at `cos_o`.
@@ -115,6 +114,10 @@ impl Paint {
     }
 
     pub(super) fn evaluate(&self, wo: DVec3, wi: DVec3) -> BsdfValue {
+        self.evaluate_between(wo, wi, Halfway::between(wo, wi))
+    }
+
+    fn evaluate_between(&self, wo: DVec3, wi: DVec3, between: Halfway) -> BsdfValue {
         let cos_i = self.normal.dot(wi);
         if cos_i <= 0.0 {
             return BsdfValue {
@@ -127,7 +130,7 @@ impl Paint {
         let diffuse = cos_i / PI * self.diffuse;
         let (mut glossy, mut pdf) = (DVec3::ZERO, q[0] * cos_i / PI);
         for (k, lobe) in self.lobes.iter().enumerate() {
-            let facets = Facets::about(self.lobe_normal(k), wo, self.cos_o(k, wo), wi);
+            let facets = Facets::about(self.lobe_normal(k), self.cos_o(k, wo), wi, between);
             let (f_cos, of_lobe) = lobe.value(&facets, cos_i);
             glossy += f_cos;
             pdf += q[k + 1] * of_lobe;
@@ -149,13 +152,15 @@ impl Paint {
         let place = DVec2::new(u[0], u[1]);
         let begin = [q[0], q[0] + q[1], q[0] + q[1] + q[2]];
         let chosen = (1..3).rev().find(|k| u[2] >= begin[*k]).unwrap_or(0);
-        let wi = if u[2] < q[0] {
-            cosine_direction(self.normal, place)
+        let (wi, between) = if u[2] < q[0] {
+            let wi = cosine_direction(self.normal, place);
+            (wi, Halfway::between(wo, wi))
         } else {
             let v = (u[2] - begin[chosen]) / q[chosen + 1].max(1.0e-30);
-            lobe_direction(self.lobe_normal(chosen), self.lobes[chosen].m, wo, place, v)
+            let m = self.lobes[chosen].m;
+            reflection(self.lobe_normal(chosen), m, wo, place, v)
         };
-        let value = self.evaluate(wo, wi);
+        let value = self.evaluate_between(wo, wi, between);
         BsdfSample {
             wi,
             weight: if value.pdf > 0.0 {

@@ -5,87 +5,18 @@ use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::Deserialize;
 
 use super::coat::{Clearcoat, Coat, lost_below};
-use super::flakes::{FLAKE_ANCHOR, FLAKE_MEMBERS, Flakes};
+use super::flakes::Flakes;
 use super::paint::{Lobe, Paint, mean};
 use super::uniform::cosine_moment;
-use super::{
-    Bsdf, BsdfSample, BsdfValue, Form, Member, MemberValue, Mistake, Surface, Value, schema,
-};
+use super::{Bsdf, BsdfSample, BsdfValue, Form, MemberValue, Mistake, Surface, Value, schema};
+
+mod cases;
+mod forms;
+
+pub(super) use cases::cases;
+pub(super) use forms::FORMS;
 
 pub(super) const NAME: &str = "car-paint";
-
-pub(super) const FORMS: &[Form] = &[
-    Form {
-        name: "car_paint",
-        what: "car paint: Lambert and three Cook-Torrance lobes",
-        members: &[
-            Member::vector("diffuse"),
-            Member::vector("specular1"),
-            Member::vector("specular2"),
-            Member::vector("specular3"),
-            Member::vector("f0"),
-            Member::vector("m"),
-        ],
-        ..Form::of(NAME)
-    },
-    Form {
-        name: "car_paint_coated",
-        what: "the same with a clear coat in the place of the third lobe",
-        part_delta: true,
-        relative: true,
-        members: &[
-            Member::vector("diffuse"),
-            Member::vector("specular1"),
-            Member::vector("specular2"),
-            Member::vector("f0"),
-            Member::vector("m"),
-            Member::scalar("coat_ior"),
-        ],
-        ..Form::of(NAME)
-    },
-    Form {
-        name: "car_paint_flakes",
-        what: "car paint with flakes",
-        offset: true,
-        anchored: &FLAKE_ANCHOR,
-        members: &[
-            Member::vector("diffuse"),
-            Member::vector("specular1"),
-            Member::vector("specular2"),
-            Member::vector("specular3"),
-            Member::vector("f0"),
-            Member::vector("m"),
-            FLAKE_MEMBERS[0],
-            FLAKE_MEMBERS[1],
-            FLAKE_MEMBERS[2],
-            FLAKE_MEMBERS[3],
-            FLAKE_MEMBERS[4],
-        ],
-        ..Form::of(NAME)
-    },
-    Form {
-        name: "car_paint_coated_flakes",
-        what: "car paint with flakes under a clear coat",
-        part_delta: true,
-        relative: true,
-        offset: true,
-        anchored: &FLAKE_ANCHOR,
-        members: &[
-            Member::vector("diffuse"),
-            Member::vector("specular1"),
-            Member::vector("specular2"),
-            Member::vector("f0"),
-            Member::vector("m"),
-            Member::scalar("coat_ior"),
-            FLAKE_MEMBERS[0],
-            FLAKE_MEMBERS[1],
-            FLAKE_MEMBERS[2],
-            FLAKE_MEMBERS[3],
-            FLAKE_MEMBERS[4],
-        ],
-        ..Form::of(NAME)
-    },
-];
 
 /// The least width of a lobe: that of other microfacets.
 const LEAST_M: f64 = super::ggx::LEAST_ALPHA;
@@ -173,79 +104,6 @@ const BLACK: Base = Base {
     f0: DVec3::ZERO,
     m: DVec3::ONE,
 };
-
-pub(super) fn cases() -> Vec<CarPaint> {
-    let case = |diffuse: [f64; 3], specular: [[f64; 3]; 3], f0: [f64; 3], m: [f64; 3]| CarPaint {
-        preset: None,
-        diffuse: Some(diffuse.into()),
-        specular: Some(specular.map(DVec3::from)),
-        f0: Some(f0.into()),
-        m: Some(m.into()),
-        ..CarPaint::default()
-    };
-    let silver = CarPaint {
-        preset: None,
-        diffuse: Some(POLARIS_SILBER.diffuse),
-        specular: Some(POLARIS_SILBER.specular),
-        f0: Some(POLARIS_SILBER.f0),
-        m: Some(POLARIS_SILBER.m),
-        ..CarPaint::default()
-    };
-    let none = [0.0; 3];
-    let coated = |paint: &CarPaint, ior| CarPaint {
-        clearcoat: Some(Clearcoat { ior }),
-        ..paint.clone()
-    };
-    let silver_of = |m: [f64; 3]| CarPaint {
-        m: Some(m.into()),
-        ..silver.clone()
-    };
-    let red = case(
-        [0.4, 0.02, 0.01],
-        [none, [0.03, 0.02, 0.02], [0.1; 3]],
-        [0.2; 3],
-        [0.5, 0.2, 0.1],
-    );
-    let flaked = |paint: CarPaint, [density, scale, spread, jitter]: [f64; 4], color: [f64; 3]| CarPaint {
-        flakes: Some(Flakes {
-            density,
-            scale,
-            spread,
-            jitter,
-            color: color.into(),
-        }),
-        ..paint
-    };
-    vec![
-        // Flakes that need the search of one cell, of two and of three along each axis.
-        flaked(silver_of([0.4, 0.2, 0.05]), [0.4, 20.0, 0.0, 0.0], [0.2; 3]),
-        flaked(red.clone(), [0.6, 8.0, 0.3, 0.5], [0.2, 0.15, 0.1]),
-        flaked(coated(&red, 1.5), [1.0, 3.0, 0.15, 1.0], [0.15, 0.15, 0.2]),
-        flaked(coated(&silver_of([0.3, 0.2, 0.1]), 2.0), [0.5, 50.0, 0.2, 0.25], [0.1; 3]),
-        // One that reflects nothing by itself, a usual coat, one of diamond over paint without lobes.
-        coated(&red, 1.0),
-        coated(&silver, 1.5),
-        coated(&case([0.3, 0.4, 0.5], [none; 3], [0.5; 3], [0.1; 3]), 2.4),
-        silver.clone(),
-        // Colours of all parts, the widest lobe, and one that reflects little but at grazing incidence.
-        case(
-            [0.3, 0.05, 0.02],
-            [[0.02, 0.04, 0.05], [0.05, 0.02, 0.1], [0.06, 0.06, 0.05]],
-            [0.3, 1.0, 0.04],
-            [1.0, 0.3, 0.1],
-        ),
-        // Parts alone.
-        case([0.5, 0.4, 0.3], [none; 3], [0.5; 3], [0.1; 3]),
-        case(none, [none, [0.2, 0.1, 0.05], none], [0.6; 3], [0.5, 0.05, 0.5]),
-        // The narrowest.
-        case(
-            [0.2, 0.2, 0.3],
-            [none, none, [0.15, 0.1, 0.05]],
-            [0.9; 3],
-            [0.5, 0.5, LEAST_M],
-        ),
-    ]
-}
 
 /// The paint on a flake of this normal.
 fn flaked(paint: &Paint, flakes: &Flakes, normal: DVec3) -> Paint {
