@@ -38,6 +38,10 @@ fn f_cos(e: &Evaluated) -> DVec3 {
     DVec3::from(e.f_cos.map(f64::from))
 }
 
+/// Values below this may be 0, or have lost digits: a few of f32's smallest normal number, which drivers may keep or
+/// not.
+const LEAST: f64 = 1.0e-36;
+
 /// weight = f cos/pdf, the pdf and the event are the same, asked by `sample` and by `evaluate`, for materials
 /// that are no delta lobes. `factor` on the weight, for companions.
 ///
@@ -60,7 +64,7 @@ pub fn weights(
             let above = s.wi().dot(input.surface().normal) > 0.0;
             // What went into a delta lobe beside others has no value.
             let delta = s.event & Event::DELTA.bits() != 0;
-            s.weight().max_element() > 0.0 && (above || transmits) && !delta
+            s.weight().max_element() > 0.0 && s.pdf > 0.0 && (above || transmits) && !delta
         })
         .map(|(input, s)| {
             let u = [s.wi[0], s.wi[1], s.wi[2], 0.0];
@@ -73,6 +77,10 @@ pub fn weights(
         let Some([by_value, by_pdf]) = allowance(subjects, input, i) else {
             continue;
         };
+        let sampled = f64::from(s.pdf) * s.weight();
+        if f_cos(e).max(sampled).max_element() < LEAST {
+            continue;
+        }
         let place = || format!("{input:?}: {s:?}, {e:?}");
         let (weight, pdf) = (factor * s.weight(), f64::from(s.pdf));
         let size = f_cos(e).max_element();
@@ -119,8 +127,8 @@ pub fn reciprocity(
         };
         let [cos_i, cos_o] = [there, back].map(cosine);
         let (f, g) = (f_cos(a) / cos_i, factor * f_cos(b) / cos_o);
-        // Below f32's smallest normal number there may be nothing left.
-        if f.max_element().max(g.max_element()) < 1.0e-32 {
+        // Both cosines are above 1e-4.
+        if f.max_element().max(g.max_element()) < 1.0e4 * LEAST {
             continue;
         }
         // The cosines here are those of the f32 numbers.
