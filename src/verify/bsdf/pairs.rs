@@ -62,7 +62,9 @@ pub fn weights(
         .zip(samples)
         .filter(|(input, s)| {
             let above = s.wi().dot(input.surface().normal) > 0.0;
-            s.weight().max_element() > 0.0 && s.pdf > 0.0 && (above || transmits)
+            // Of directions that are nearly opposite, rounding turns the half vector by its share of their sum.
+            let known = (s.wi() + input.wo()).length() > 1.0e-3;
+            s.weight().max_element() > 0.0 && s.pdf > 0.0 && (above && known || transmits)
         })
         .map(|(input, s)| {
             let u = [s.wi[0], s.wi[1], s.wi[2], 0.0];
