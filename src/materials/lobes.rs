@@ -32,12 +32,18 @@ pub struct Pair {
 }
 
 impl Pair {
-    /// Of two directions.
+    /// Of two directions. o.h is half the length of o + i: where both graze, the product is what the lengths of o and
+    /// i, which are 1 but for a rounding, make of it, and may be 0.
     #[must_use]
     pub fn between(o: DVec3, i: DVec3) -> Self {
-        let h = (o + i).normalize();
-        let cos_h = o.dot(h).clamp(0.0, 1.0);
-        Self { o, i, h, cos_h }
+        let sum = o + i;
+        let size = sum.length();
+        Self {
+            o,
+            i,
+            h: sum / size,
+            cos_h: (0.5 * size).min(1.0),
+        }
     }
 
     /// Of a direction and its reflection about `h`.

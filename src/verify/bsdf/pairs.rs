@@ -16,6 +16,11 @@ fn allowance(subjects: &Subjects, input: &BsdfInput, seed: usize) -> Option<[f64
     let mut random = Random::new(&format!("pairs {seed}"));
     let mut spread = [0.0f64; 2];
     let size = truth.f_cos.max_element();
+    // A spread about infinity would be no number, and pass for none.
+    assert!(
+        size.is_finite() && truth.pdf.is_finite(),
+        "{input:?}: the twin has {truth:?}"
+    );
     for _ in 0..PERTURBED {
         let other = subjects.twin_evaluate(subject, &question.perturbed(&mut random));
         if other.event != truth.event {
@@ -62,9 +67,7 @@ pub fn weights(
         .zip(samples)
         .filter(|(input, s)| {
             let above = s.wi().dot(input.surface().normal) > 0.0;
-            // Of directions that are nearly opposite, rounding turns the half vector by its share of their sum.
-            let known = (s.wi() + input.wo()).length() > 1.0e-3;
-            s.weight().max_element() > 0.0 && s.pdf > 0.0 && (above && known || transmits)
+            s.weight().max_element() > 0.0 && s.pdf > 0.0 && (above || transmits)
         })
         .map(|(input, s)| {
             let u = [s.wi[0], s.wi[1], s.wi[2], 0.0];
