@@ -57,7 +57,10 @@ fn it_is_the_papers_formula() {
         // 1 - (n.h)^2 of the printed exponent loses digits, and the largest exponents magnify them.
         let size = upright.nu.max(upright.nv).max(1.0);
         let found = furthest(&upright, |wo, wi| paper(&upright, wo, wi));
-        assert!(found < 1.0e-10 * size, "{upright:?}: {found:e}");
+        // So does the printed k1.h of grazing directions, which are of unit length but for some 1e-16: over the square
+        // of their sum's length, above 1e-4 for those drawn here.
+        let allowed = f64::max(1.0e-10 * size, 1.0e-8);
+        assert!(found < allowed, "{upright:?}: {found:e}");
         let wrong = Ashikhmin {
             nv: 1.01 * upright.nv + 0.01,
             ..upright.clone()
