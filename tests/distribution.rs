@@ -6,8 +6,10 @@
 //! uniform, or a cap 1 % too wide fail (the companions).
 
 use std::f64::consts::{PI, TAU};
+use std::sync::LazyLock;
 
 use crate::common::{gpu, probe, probe_of, scene};
+use crate::thorough::thorough;
 use bytemuck::Pod;
 use glam::{DVec2, DVec3};
 use gpu_trace::gpu::probe::Probe;
@@ -17,7 +19,7 @@ use gpu_trace::placement::Placement;
 use gpu_trace::settings::Integrator;
 use gpu_trace::statistics::{chi_square, normal_limit, normal_p, sidak};
 use gpu_trace::verify::bsdf::Subjects;
-use gpu_trace::verify::bsdf::draw::Draw;
+use gpu_trace::verify::bsdf::draw::{Draw, Energy};
 use gpu_trace::verify::{Cells, Outcome, Random, Row, to_row, vector};
 
 const SAMPLES: usize = 1_000_000;
@@ -98,49 +100,73 @@ fn lens(power: f64) -> Vec<Outcome> {
 /// Samples of each case of each material at each angle.
 const DRAWN: usize = 300_000;
 
-/// The short form draws from so many cases of a material, the long one from all.
+/// The short form draws from so many cases of a form, the long one from all; uniform directions, which are the
+/// same for all, from one.
 const CASES: usize = 3;
-
-/// What is done with what a material's cases give.
-fn each_draw<T>(integrator: Integrator, of: impl Fn(&Draw<'_>, &MaterialKind) -> T) -> Vec<T> {
-    let subjects = Subjects::all(&gpu(), integrator).unwrap_or_else(|e| panic!("{e}"));
-    let mut found = Vec::new();
-    let mut cases = std::collections::BTreeMap::new();
-    for (subject, kind) in subjects.kinds().iter().enumerate() {
-        let case: &mut usize = cases.entry(kind.form().name).or_default();
-        *case += 1;
-        if *case > CASES && !crate::thorough::thorough() {
-            continue;
-        }
-        // Delta lobes are the same whatever the integrator.
-        if integrator == Integrator::Bsdf || subjects.is_uniform(subject) {
-            let draws = Draw::all(&subjects, subject, DRAWN).unwrap_or_else(|e| panic!("{e}"));
-            found.extend(draws.iter().map(|draw| of(draw, kind)));
-        }
-    }
-    found
-}
+const UNIFORM_CASES: usize = 1;
 
 const LECTURE: Integrator = Integrator::Lecture { termination: 0.2 };
+
+/// What is asked of a draw by all tests, so that it is drawn once.
+struct Found {
+    integrator: Integrator,
+    kind: MaterialKind,
+    name: String,
+    /// p-values of the twin's pdf, and of one that is wrong.
+    right: f64,
+    wrong: f64,
+    energy: Energy,
+    /// Those of the material's own sampling.
+    moments: Option<[[f64; 3]; 4]>,
+}
+
+/// What each material's cases give.
+fn found() -> &'static [Found] {
+    static FOUND: LazyLock<Vec<Found>> = LazyLock::new(|| {
+        let mut found = Vec::new();
+        for (integrator, most) in [(Integrator::Bsdf, CASES), (LECTURE, UNIFORM_CASES)] {
+            let most = if thorough() { usize::MAX } else { most };
+            let subjects = Subjects::all(&gpu(), integrator).unwrap_or_else(|e| panic!("{e}"));
+            for subject in subjects.first_of_each_form(most) {
+                // Delta lobes are the same whatever the integrator.
+                if integrator == Integrator::Bsdf || subjects.is_uniform(subject) {
+                    let draws = Draw::all(&subjects, subject, DRAWN);
+                    for draw in draws.unwrap_or_else(|e| panic!("{e}")) {
+                        let kind = subjects.kinds()[subject].clone();
+                        found.push(Found::of(&draw, kind, integrator));
+                    }
+                }
+            }
+        }
+        found
+    });
+    &FOUND
+}
+
+impl Found {
+    fn of(draw: &Draw<'_>, kind: MaterialKind, integrator: Integrator) -> Self {
+        // A companion that is not found: what has one lobe in one direction chooses nothing.
+        let chooses = !kind.is_delta() || kind.transmits();
+        Self {
+            integrator,
+            name: draw.name().to_owned(),
+            right: draw.follows(0.0).1,
+            wrong: if chooses { draw.follows(0.1).1 } else { 1.0 },
+            energy: draw.energy(),
+            moments: (integrator == Integrator::Bsdf).then(|| draw.moments()),
+            kind,
+        }
+    }
+}
 
 #[test]
 fn samples_follow_their_pdfs() {
     let mut outcomes = Vec::new();
-    for integrator in [Integrator::Bsdf, LECTURE] {
-        let followed = each_draw(integrator, |draw, kind| {
-            // A companion that is not found: what has one lobe in one direction chooses nothing.
-            let wrong = if kind.is_delta() && !kind.transmits() {
-                1.0
-            } else {
-                draw.follows(0.1).1
-            };
-            (draw.follows(0.0), wrong, kind.is_delta())
-        });
-        for (outcome, wrong, delta) in followed {
-            let found = wrong < sidak(100);
-            assert!(found || delta, "not found: {}, p = {wrong:e}", outcome.0);
-            outcomes.push(outcome);
-        }
+    for draw in found() {
+        let Found { name, wrong, .. } = draw;
+        let found = *wrong < sidak(100) || draw.kind.is_delta();
+        assert!(found, "not found: {name}, p = {wrong:e}");
+        outcomes.push((name.clone(), draw.right));
     }
     outcomes.extend(sphere());
     outcomes.extend(cap(1.0));
@@ -160,20 +186,12 @@ fn samples_follow_their_pdfs() {
 #[test]
 fn mean_weights_are_the_light_that_is_scattered() {
     for integrator in [Integrator::Bsdf, LECTURE] {
-        let found = each_draw(integrator, |draw, kind| {
-            // Uniform directions meet a lobe so narrow that its second moment is that large a few times or
-            // never: no estimate.
-            let rare = integrator == LECTURE && kind.moment(0, 2) > DRAWN as f64;
-            (!rare).then(|| {
-                (
-                    draw.name().to_owned(),
-                    draw.energy(),
-                    kind.albedo().to_array(),
-                )
-            })
-        });
-        let all = found.len();
-        let found: Vec<_> = found.into_iter().flatten().collect();
+        // Uniform directions meet a lobe so narrow that its second moment is that large a few times or
+        // never: no estimate.
+        let rare = |kind: &MaterialKind| integrator == LECTURE && kind.moment(0, 2) > DRAWN as f64;
+        let found = found().iter().filter(|draw| draw.integrator == integrator);
+        let all = found.clone().count();
+        let found: Vec<&Found> = found.filter(|draw| !rare(&draw.kind)).collect();
         assert!(
             2 * found.len() > all,
             "only {} of {all} materials",
@@ -181,8 +199,11 @@ fn mean_weights_are_the_light_that_is_scattered() {
         );
         let limit = normal_limit(3 * found.len());
         let mut missed = 0;
-        for (name, energy, albedo) in &found {
-            for (c, most) in albedo.iter().enumerate() {
+        for Found {
+            name, energy, kind, ..
+        } in &found
+        {
+            for (c, most) in kind.albedo().to_array().iter().enumerate() {
                 let (drawn, truth) = (energy.drawn[c], energy.integrals[c]);
                 // The quadrature, and weights that are the same every time up to rounding.
                 let allowed = |truth: f64| limit * energy.errors[c] + 2.0e-5 * truth;
@@ -217,12 +238,9 @@ fn mean_weights_are_the_light_that_is_scattered() {
 
 #[test]
 fn moments_are_within_their_bounds() {
-    let found = each_draw(Integrator::Bsdf, |draw, _| {
-        (draw.name().to_owned(), draw.moments())
-    });
     let mut largest = 0.0f64;
-    for (name, moments) in &found {
-        for moment in moments.as_flattened() {
+    for Found { name, moments, .. } in found() {
+        for moment in moments.iter().flatten().flatten() {
             assert!(*moment <= 1.0 + 1.0e-4, "{name}: {moments:?} of the bound");
             largest = largest.max(*moment);
         }

@@ -2,6 +2,7 @@
 //! where there is no surface there is none to be seen. (Its BSDF is tested as that of every material is.)
 
 use crate::common::{render_gpu, scene};
+use crate::thorough::thorough;
 use gpu_trace::film::Film;
 use gpu_trace::scene::Scene;
 use gpu_trace::settings::{Integrator, LightSampling, Settings};
@@ -102,15 +103,20 @@ fn mean(film: &Film) -> [f64; 2] {
 
 #[test]
 fn lamps_are_found_on_both_sides() {
-    const SPP: u64 = 1024;
+    // The long form finds half of what the short one does.
+    let (spp, least) = if thorough() {
+        (2048, 0.015)
+    } else {
+        (512, 0.03)
+    };
     let mut apart = Vec::new();
     for (name, scene) in situations() {
-        let base = settings(&scene, 16, 16, SPP);
+        let base = settings(&scene, 16, 16, spp);
         let with = |integrator, light_sampling, factor| {
             let settings = Settings {
                 integrator,
                 light_sampling,
-                samples: 0..SPP * factor,
+                samples: 0..spp * factor,
                 seed: factor,
                 ..base.clone()
             };
@@ -135,13 +141,13 @@ fn lamps_are_found_on_both_sides() {
                 "{name}: {found:.5}, z = {z:.2}, error {:.3} %",
                 100.0 * both / truth
             );
-            apart.push((name, z, 0.02 * truth / both));
+            apart.push((name, z, least * truth / both));
         }
     }
     let limit = normal_limit(apart.len());
     let failed: Vec<_> = apart.iter().filter(|(_, z, _)| z.abs() > limit).collect();
     assert!(failed.is_empty(), "beyond {limit}: {failed:?}");
-    // Power: 2 % of the light is found missing in most of them.
+    // Power: so much of the light is found missing in most of them.
     let found = apart.iter().filter(|(.., shift)| *shift > 2.0 * limit);
     assert!(4 * found.count() >= 3 * apart.len(), "{apart:?}");
 }

@@ -99,23 +99,23 @@ fn companion_samples_of_a_scramble_are_not_independent() {
     let scene = scene_file("scenes/lecture.toml");
     let placement = Placement::new(&scene, 20, 20);
     let z = |sampler| {
-        // Of every other pixel.
-        let (z, ratio) = bars(200, |seed| {
+        // Of every other pixel, and of every other line.
+        let (z, ratio) = bars(100, |seed| {
             let settings = small(&scene, sampler, 256, seed);
             let tracer = PathTracer {
                 scene: &scene,
                 placement: &placement,
                 settings: &settings,
             };
-            (0..200)
-                .map(|i| single_samples(&tracer, [i % 10 * 2, i / 10]))
+            (0..100)
+                .map(|i| single_samples(&tracer, [i % 10 * 2, i / 10 * 2]))
                 .collect()
         });
         eprintln!("{sampler:?}: ratio {ratio:.3}, z = {z:.2}");
         z
     };
     assert!(z(Sampler::Independent).abs() < 3.9);
-    assert!(z(Sampler::Sobol) > 8.0);
+    assert!(z(Sampler::Sobol) > 5.0);
 }
 
 /// The mean of a pixel, and its variance if the samples were independent.

@@ -8,6 +8,8 @@ pub mod draw;
 pub mod pairs;
 pub mod twin;
 
+use std::collections::BTreeMap;
+
 use glam::DVec3;
 
 use crate::error::Result;
@@ -52,6 +54,17 @@ impl Subjects {
     #[must_use]
     pub fn kinds(&self) -> &[MaterialKind] {
         &self.kinds
+    }
+
+    /// The places of the first `most` cases of each form.
+    pub fn first_of_each_form(&self, most: usize) -> impl Iterator<Item = usize> + '_ {
+        let mut taken: BTreeMap<&str, usize> = BTreeMap::new();
+        let all = self.kinds.iter().enumerate();
+        all.filter_map(move |(subject, kind)| {
+            let taken = taken.entry(kind.form().name).or_default();
+            *taken += 1;
+            (*taken <= most).then_some(subject)
+        })
     }
 
     /// Whether they are sampled uniformly, but for delta lobes.
