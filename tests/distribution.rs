@@ -164,8 +164,8 @@ fn samples_follow_their_pdfs() {
     let mut outcomes = Vec::new();
     for draw in found() {
         let Found { name, wrong, .. } = draw;
-        let found = *wrong < sidak(100) || draw.kind.is_delta();
-        assert!(found, "not found: {name}, p = {wrong:e}");
+        let told = *wrong < sidak(100) || draw.kind.is_delta();
+        assert!(told, "not found: {name}, p = {wrong:e}");
         outcomes.push((name.clone(), draw.right));
     }
     outcomes.extend(sphere());

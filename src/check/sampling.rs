@@ -21,9 +21,9 @@ use crate::verify::{Cells, Measure, Outcome, Random, Row, to_row, vector};
 pub(super) const CASES: &[Case] = &[Case {
     id: 28,
     name: "samples against their pdf",
-    setup: "caps, and every case of every material at 0, 45, 85 and 89.9 degrees, from either \
-            side, and under the lecture's integrator, by chi-square; of delta lobes by how often \
-            each is chosen (one case of each form in the quick form); log p over the log of the \
+    setup: "caps, and every case of every material (in the quick form one of each form) at 0, 45, \
+            85 and 89.9 degrees, from either side, and under the lecture's integrator, by \
+            chi-square; of delta lobes by how often each is chosen; log p over the log of the \
             level that Sidak leaves of 1e-3. Mirrors are a delta: the direction in units of 16 ulp",
     run: samples,
 }];

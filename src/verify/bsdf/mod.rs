@@ -187,7 +187,8 @@ impl Question {
 
 /// What arithmetic in f32 makes of a formula is what the formula makes of inputs that are slightly off: by so
 /// much, for some 16 operations one after another. What that does is found from [`PERTURBED`] random ones;
-/// besides, there are the roundings of the last steps and of the parameters, [`ROUNDINGS`].
+/// besides, there are the roundings of the last steps and of the parameters, [`ROUNDINGS`]. The largest of a few random
+/// ones is an estimate and no bound: of 256314 weights of a rough metal one is off by 1.009 of it, at a cosine of 0.002.
 const INPUTS: f64 = 16.0 * ULP;
 const PERTURBED: usize = 8;
 const ROUNDINGS: f64 = 16.0 * ULP;
