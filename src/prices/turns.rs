@@ -1,0 +1,167 @@
+//! Two kernels in turns.
+
+use std::ops::Range;
+use std::time::Instant;
+
+use super::{Difference, Measured, Watch};
+use crate::backend::Backend;
+use crate::error::Result;
+use crate::job::Job;
+use crate::render::{Renderer, render_quietly};
+use crate::settings::Settings;
+use crate::shader::{Stage, link};
+use crate::statistics::{mean_and_error, student_quantile};
+
+/// Turns of each of two kernels.
+pub const ROUNDS: u64 = 8;
+/// Seconds of a turn, at least, where that takes no more samples than [`MOST`].
+const TURN: f64 = 0.15;
+/// Samples a pixel of a turn, at least: two batches at least tell a variance.
+const LEAST: u64 = 16;
+/// Samples a pixel of a turn, at most.
+const MOST: u64 = 1 << 16;
+/// Confidence of the interval.
+const CONFIDENCE: f64 = 0.95;
+
+/// A kernel, compiled.
+pub(super) struct Bench {
+    renderer: Box<dyn Renderer>,
+    settings: Settings,
+    /// Whether its error can be estimated.
+    error_bars: bool,
+    lines: usize,
+    compile_seconds: f64,
+}
+
+impl Bench {
+    pub(super) fn new(backend: &Backend, job: &Job) -> Result<Self> {
+        let begin = Instant::now();
+        let renderer = backend.renderer(job)?;
+        let compile_seconds = begin.elapsed().as_secs_f64();
+        let kernel = link(Stage::Path, job.scene(), job.placement(), job.effects())?;
+        Ok(Self {
+            renderer,
+            settings: job.settings().clone(),
+            error_bars: job.claims().has_error_bars(),
+            lines: kernel.wgsl.lines().count(),
+            compile_seconds,
+        })
+    }
+
+    /// Name, interface and driver.
+    pub(super) fn device(&self) -> (String, String, String) {
+        self.renderer.device()
+    }
+
+    /// Seconds of these samples, and the relative variance of one of them if that can be told.
+    fn turn(&mut self, samples: Range<u64>) -> Result<(f64, Option<f64>)> {
+        let spp = samples.end - samples.start;
+        let settings = Settings {
+            samples,
+            ..self.settings.clone()
+        };
+        let begin = Instant::now();
+        let outcome = render_quietly(self.renderer.as_mut(), &settings)?;
+        let seconds = begin.elapsed().as_secs_f64();
+        let error = outcome.estimate.error.filter(|_| self.error_bars);
+        Ok((seconds, error.map(|error| error * error * spp as f64)))
+    }
+}
+
+/// What a sample with an effect takes and what one with its alternative does.
+#[derive(Clone, Copy, Debug)]
+pub struct Cost {
+    /// Seconds of a million samples with it.
+    pub with: f64,
+    /// The same with the alternative.
+    pub against: f64,
+    /// The difference: what the effect costs.
+    pub price: f64,
+    /// Ends of the price's 95 % interval, from the spread of the turns.
+    pub interval: [f64; 2],
+    /// The relative variance of a sample with the effect over that of one with the alternative, where both can be
+    /// told.
+    pub variance_ratio: Option<f64>,
+}
+
+/// How long turns are.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Meter {
+    spp: u64,
+    seconds_per_megasample: f64,
+}
+
+/// Seconds of a million of `spp` samples of each pixel that take `seconds`.
+fn per_megasample(seconds: f64, settings: &Settings, spp: u64) -> f64 {
+    1.0e6 * seconds / (settings.crop.pixels() as f64 * spp as f64)
+}
+
+impl Meter {
+    /// Finds out how many samples are long enough; the first of them warm up the device.
+    pub(super) fn new(own: &mut Bench) -> Result<Self> {
+        let mut spp = LEAST;
+        own.turn(0..spp)?;
+        loop {
+            let (seconds, _) = own.turn(0..spp)?;
+            if seconds >= TURN || spp >= MOST {
+                return Ok(Self {
+                    spp,
+                    seconds_per_megasample: per_megasample(seconds, &own.settings, spp),
+                });
+            }
+            spp *= 2;
+        }
+    }
+
+    /// What is known of the kernel whose turns are so long.
+    pub(super) fn kernel(&self, own: &Bench) -> Measured {
+        Measured {
+            size: [own.settings.width, own.settings.height],
+            spp: self.spp,
+            seconds_per_megasample: self.seconds_per_megasample,
+            lines: own.lines,
+            compile_seconds: own.compile_seconds,
+        }
+    }
+
+    /// Runs both in turns, the one or the other first, on the same samples; `None` if `watch` says to stop.
+    pub(super) fn difference(
+        self,
+        with: &mut Bench,
+        against: &mut Bench,
+        watch: &dyn Watch,
+    ) -> Result<Option<Difference>> {
+        let seconds = |seconds, bench: &Bench| per_megasample(seconds, &bench.settings, self.spp);
+        let mut times = [Vec::new(), Vec::new()];
+        let mut variances = [Some(0.0), Some(0.0)];
+        for round in 0..ROUNDS {
+            let samples = round * self.spp..(round + 1) * self.spp;
+            let order = if round % 2 == 0 { [0, 1] } else { [1, 0] };
+            for which in order {
+                if !watch.goes_on() {
+                    return Ok(None);
+                }
+                let bench: &mut Bench = if which == 0 { with } else { against };
+                let (taken, variance) = bench.turn(samples.clone())?;
+                times[which].push(seconds(taken, bench));
+                variances[which] = variances[which].zip(variance).map(|(sum, v)| sum + v);
+            }
+        }
+        let differences: Vec<f64> = times[0].iter().zip(&times[1]).map(|(a, b)| a - b).collect();
+        let (price, error) = mean_and_error(&differences);
+        let t = student_quantile((ROUNDS - 1) as f64, CONFIDENCE);
+        let [with_variance, against_variance] = variances;
+        let ratio = with_variance.zip(against_variance).map(|(a, b)| a / b);
+        Ok(Some(Difference {
+            cost: Cost {
+                with: mean_and_error(&times[0]).0,
+                against: mean_and_error(&times[1]).0,
+                price,
+                interval: [price - t * error, price + t * error],
+                variance_ratio: ratio.filter(|ratio| ratio.is_finite() && *ratio > 0.0),
+            },
+            kernel_lines: with.lines as i64 - against.lines as i64,
+            compile_seconds: with.compile_seconds - against.compile_seconds,
+        }))
+    }
+}
