@@ -20,7 +20,7 @@ use crate::shader::{Stage, link, link_without};
 pub use alternative::{Alternative, alternative};
 pub use forced::forced;
 pub use standard::standard;
-pub use turns::{Cost, ROUNDS};
+pub use turns::{Cost, Effort};
 
 use turns::{Bench, Meter};
 
@@ -78,6 +78,8 @@ pub struct PriceList {
     pub kernel: Option<Measured>,
     /// A row for each effect.
     pub prices: Vec<Price>,
+    /// Turns of each of two kernels.
+    pub rounds: u64,
     /// Whether it was stopped before all was measured.
     pub interrupted: bool,
 }
@@ -154,15 +156,17 @@ pub fn measure(
     scene: &Scene,
     settings: &Settings,
     left_out: bool,
+    effort: Effort,
     watch: &mut dyn Watch,
 ) -> Result<PriceList> {
     let job = prepare_measured(scene, settings)?;
     let mut own = Bench::new(backend, &job)?;
-    let meter = Meter::new(&mut own)?;
+    let meter = Meter::new(&mut own, effort)?;
     let mut list = PriceList {
         device: own.device(),
         kernel: Some(meter.kernel(&own)),
         prices: Vec::new(),
+        rounds: effort.rounds,
         interrupted: false,
     };
     let is_measured = |reasons: &[String]| left_out || !reasons.is_empty();
@@ -192,7 +196,11 @@ pub fn measure(
 ///
 /// # Errors
 /// If a standard scene cannot be rendered, or the device fails.
-pub fn measure_all(backend: &Backend, watch: &mut dyn Watch) -> Result<PriceList> {
+pub fn measure_all(
+    backend: &Backend,
+    effort: Effort,
+    watch: &mut dyn Watch,
+) -> Result<PriceList> {
     let mut prices = Vec::new();
     let mut device = None;
     for (done, row) in table().iter().enumerate() {
@@ -202,7 +210,7 @@ pub fn measure_all(backend: &Backend, watch: &mut dyn Watch) -> Result<PriceList
         let reasons = job.effects().reasons(row.effect).to_vec();
         let mut own = Bench::new(backend, &job)?;
         device.get_or_insert_with(|| own.device());
-        let meter = Meter::new(&mut own)?;
+        let meter = Meter::new(&mut own, effort)?;
         let mut price = Price::of(row, &reasons);
         if reasons.is_empty() {
             price.forced = force(backend, &job, row.effect, &mut own, meter, watch)?;
@@ -217,6 +225,7 @@ pub fn measure_all(backend: &Backend, watch: &mut dyn Watch) -> Result<PriceList
     Ok(PriceList {
         device: device.unwrap_or_default(),
         kernel: None,
+        rounds: effort.rounds,
         interrupted: prices.len() < table().len(),
         prices,
     })

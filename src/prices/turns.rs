@@ -12,10 +12,24 @@ use crate::settings::Settings;
 use crate::shader::{Stage, link};
 use crate::statistics::{mean_and_error, student_quantile};
 
-/// Turns of each of two kernels.
-pub const ROUNDS: u64 = 8;
-/// Seconds of a turn, at least, where that takes no more samples than [`MOST`].
-const TURN: f64 = 0.15;
+/// How much is measured.
+#[derive(Clone, Copy, Debug)]
+pub struct Effort {
+    /// Turns of each of two kernels, at least 2.
+    pub rounds: u64,
+    /// Seconds of a turn, at least, as far as so many samples a pixel can be taken.
+    pub turn: f64,
+}
+
+impl Default for Effort {
+    fn default() -> Self {
+        Self {
+            rounds: 8,
+            turn: 0.15,
+        }
+    }
+}
+
 /// Samples a pixel of a turn, at least: two batches at least tell a variance.
 const LEAST: u64 = 16;
 /// Samples a pixel of a turn, at most.
@@ -87,6 +101,7 @@ pub struct Cost {
 /// How long turns are.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Meter {
+    rounds: u64,
     spp: u64,
     seconds_per_megasample: f64,
 }
@@ -98,13 +113,14 @@ fn per_megasample(seconds: f64, settings: &Settings, spp: u64) -> f64 {
 
 impl Meter {
     /// Finds out how many samples are long enough; the first of them warm up the device.
-    pub(super) fn new(own: &mut Bench) -> Result<Self> {
+    pub(super) fn new(own: &mut Bench, effort: Effort) -> Result<Self> {
         let mut spp = LEAST;
         own.turn(0..spp)?;
         loop {
             let (seconds, _) = own.turn(0..spp)?;
-            if seconds >= TURN || spp >= MOST {
+            if seconds >= effort.turn || spp >= MOST {
                 return Ok(Self {
+                    rounds: effort.rounds,
                     spp,
                     seconds_per_megasample: per_megasample(seconds, &own.settings, spp),
                 });
@@ -134,7 +150,7 @@ impl Meter {
         let seconds = |seconds, bench: &Bench| per_megasample(seconds, &bench.settings, self.spp);
         let mut times = [Vec::new(), Vec::new()];
         let mut variances = [Some(0.0), Some(0.0)];
-        for round in 0..ROUNDS {
+        for round in 0..self.rounds {
             let samples = round * self.spp..(round + 1) * self.spp;
             let order = if round % 2 == 0 { [0, 1] } else { [1, 0] };
             for which in order {
@@ -149,7 +165,7 @@ impl Meter {
         }
         let differences: Vec<f64> = times[0].iter().zip(&times[1]).map(|(a, b)| a - b).collect();
         let (price, error) = mean_and_error(&differences);
-        let t = student_quantile((ROUNDS - 1) as f64, CONFIDENCE);
+        let t = student_quantile((self.rounds - 1) as f64, CONFIDENCE);
         let [with_variance, against_variance] = variances;
         let ratio = with_variance.zip(against_variance).map(|(a, b)| a / b);
         Ok(Some(Difference {

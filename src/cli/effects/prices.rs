@@ -14,7 +14,7 @@ use crate::backend::Backend;
 use crate::error::{Error, Result};
 use crate::output::{Progress, Snapshot};
 use crate::prices::{
-    self, Against, Difference, Measured, Price, PriceList, ROUNDS, Told, Watch, measure,
+    self, Against, Difference, Effort, Measured, Price, PriceList, Told, Watch, measure,
     measure_all,
 };
 use crate::scene::Loaded;
@@ -27,14 +27,14 @@ pub(super) fn of_scene(args: &EffectsArgs, loaded: &Loaded, settings: &Settings)
         None => prices::smaller(settings),
     };
     let list = run(&args.render, |backend, watch| {
-        measure(backend, &loaded.scene, &settings, true, watch)
+        measure(backend, &loaded.scene, &settings, true, Effort::default(), watch)
     })?;
     show(args, &loaded.name, list)
 }
 
 /// Measures all effects of the program.
 pub(super) fn all(args: &EffectsArgs) -> Result<()> {
-    let list = run(&args.render, |backend, watch| measure_all(backend, watch))?;
+    let list = run(&args.render, |backend, watch| measure_all(backend, Effort::default(), watch))?;
     show(args, "each effect on a ball of its own", list)
 }
 
@@ -47,7 +47,7 @@ pub(in super::super) fn shares(
     progress: &Progress,
 ) -> Result<PriceList> {
     let mut display = Display::new(signals, progress);
-    measure(backend, &loaded.scene, settings, false, &mut display)
+    measure(backend, &loaded.scene, settings, false, Effort::default(), &mut display)
 }
 
 /// A list, and how the signals left it.
@@ -130,7 +130,7 @@ fn document(scene: &str, list: &PriceList) -> Value {
     let mut document = json!({
         "device": { "name": name, "backend": backend, "driver": driver },
         "scene": scene,
-        "rounds": ROUNDS,
+        "rounds": list.rounds,
         "interrupted": list.interrupted,
         "effects": list.prices.iter().map(row_json).collect::<Vec<_>>(),
     });
