@@ -5,6 +5,7 @@
 //! of several rounds. Nothing is asserted.
 
 mod loading;
+mod materials;
 #[expect(dead_code, reason = "f64 is for `hazards` and the tests")]
 mod naive;
 mod offsets;
@@ -48,6 +49,9 @@ fn main() {
     }
     if chosen("geometry") {
         geometry_forms();
+    }
+    if chosen("materials") {
+        materials::run();
     }
     if chosen("trees") {
         trees::run();

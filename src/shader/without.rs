@@ -7,9 +7,11 @@ use crate::effects::{Effect, Effects};
 
 /// Whether the file below `shaders/` at `path` is there for `effect` alone, in kernels that otherwise have `effects`.
 pub(super) fn is_own(path: &str, effect: Effect, effects: &Effects) -> bool {
-    let with = effects.with(&[effect], "");
+    let others: Vec<Effect> = effects.used().filter(|used| *used != effect).collect();
+    let others = Effects::of(&others);
     let plays = |effects: &Effects| effects.roles().iter().any(|role| role.file == Some(path));
-    (plays(&with) && !plays(effects)) || effect.row().is_marked(&path.replace('/', "::"))
+    let plays_with_it = plays(&others.with(&[effect], "")) && !plays(&others);
+    plays_with_it || effect.row().is_marked(&path.replace('/', "::"))
 }
 
 /// The text without what needs `effect`: what stands after an `@if` that does not hold without it, and functions
