@@ -6,8 +6,9 @@ use gpu_trace::job::{Job, prepare};
 use gpu_trace::prices::{
     Effort, Price, PriceList, Watch, alternative, forced, is_absent, measure, smaller, standard,
 };
+use gpu_trace::render::render_quietly;
 use gpu_trace::scene::builtin;
-use gpu_trace::settings::Settings;
+use gpu_trace::settings::{Rect, Settings};
 use gpu_trace::shader::{Stage, link, link_without};
 
 use crate::thorough::thorough;
@@ -114,10 +115,69 @@ fn what_is_forced_links() {
                 assert!(with.effects().has(row.effect));
                 forcible += 1;
             }
-            Err(why) => assert!(why.contains("not in one kernel"), "{}: {why}", row.name),
+            Err(why) => {
+                let known = ["not in one kernel", "would be in use", "the scene has not"];
+                let known = known.iter().any(|reason| why.contains(reason));
+                assert!(known, "{}: {why}", row.name);
+            }
         }
     }
     assert!(forcible > 15, "{forcible}");
+}
+
+/// The mean of each pixel of a small image.
+fn image(job: &Job) -> Vec<[f64; 3]> {
+    let mut warnings = Vec::new();
+    let backend = Backend::open(&BackendChoice::default(), &mut warnings).expect("a device");
+    let mut renderer = backend.renderer(job).expect("a renderer");
+    let film = render_quietly(renderer.as_mut(), job.settings());
+    let film = film.expect("an image").film;
+    (0..film.rect().pixels()).map(|i| film.mean(i)).collect()
+}
+
+/// The share of the pixels of which a channel differs by more than a hundred thousandth.
+fn differing(a: &[[f64; 3]], b: &[[f64; 3]]) -> f64 {
+    let differ = |a: &[f64; 3], b: &[f64; 3]| {
+        (0..3).any(|c| (a[c] - b[c]).abs() > 1e-5 * a[c].abs().max(1e-3))
+    };
+    let count = a.iter().zip(b).filter(|(a, b)| differ(a, b)).count();
+    count as f64 / a.len() as f64
+}
+
+/// A kernel of what the scene asks for and one of everything make the same image; in the long form, one of each
+/// other effect does, too.
+#[test]
+fn unused_effects_change_no_image() {
+    let scene = builtin::resolve(Some("lecture")).expect("a scene").scene;
+    let mut settings = Settings {
+        width: 32,
+        height: 32,
+        samples: 0..16,
+        ..Settings::for_scene(&scene)
+    };
+    (settings.crop.width, settings.crop.height) = (32, 32);
+    let own = prepare(&scene, &settings).expect("a job");
+    let expected = image(&own);
+    let mut full = own.clone();
+    for row in table().iter().filter(|row| !own.effects().has(row.effect)) {
+        if let Ok(with) = forced(&full, row.effect) {
+            full = with;
+        }
+        if thorough() && let Ok(with) = forced(&own, row.effect) {
+            let share = differing(&expected, &image(&with));
+            assert!(share <= 0.001, "{}: {share}", row.name);
+        }
+    }
+    assert!(full.effects().used().count() > own.effects().used().count() + 15);
+    let share = differing(&expected, &image(&full));
+    assert!(share <= 0.001, "all of them: {share}");
+    // The companion: other samples are another image.
+    let other = Settings {
+        seed: 1,
+        ..settings
+    };
+    let other = image(&prepare(&scene, &other).expect("a job"));
+    assert!(differing(&expected, &other) > 0.9);
 }
 
 fn measured(scene: &str, parts: usize) -> PriceList {
@@ -127,6 +187,12 @@ fn measured(scene: &str, parts: usize) -> PriceList {
     let settings = Settings {
         width: 16,
         height: 16,
+        crop: Rect {
+            x: 0,
+            y: 0,
+            width: 16,
+            height: 16,
+        },
         ..Settings::for_scene(&scene)
     };
     let mut watch = Quiet { left: parts };

@@ -4,11 +4,12 @@ use super::Told;
 use crate::effects::Effect;
 use crate::job::Job;
 
-/// The job with `effect` in its kernel, and what that needs; or why that cannot be.
+/// The job with `effect` in its kernel, and what that needs: its images stay what they are. Or why that cannot be.
 ///
 /// # Errors
 /// With the reason.
 pub fn forced(job: &Job, effect: Effect) -> Told<Job> {
+    check(effect)?;
     let used: Vec<Effect> = job.effects().used().collect();
     let mut with = used.clone();
     add(effect, &mut with)?;
@@ -22,6 +23,25 @@ pub fn forced(job: &Job, effect: Effect) -> Told<Job> {
         }
     }
     Ok(job.clone().with_effects(more, "forced"))
+}
+
+/// Refuses what cannot be linked in and stay unused.
+fn check(effect: Effect) -> Told<()> {
+    match effect {
+        Effect::Nudge
+        | Effect::Ulp
+        | Effect::Sobol
+        | Effect::BvhCost
+        | Effect::Lecture
+        | Effect::Lights
+        | Effect::Skylight
+        | Effect::Projected
+        | Effect::Table
+        | Effect::Mis
+        | Effect::Roulette => Err("linked in, it would be in use".into()),
+        Effect::Gradient | Effect::Sky => Err("it is made of what the scene has not".into()),
+        _ => Ok(()),
+    }
 }
 
 /// Adds an effect and the first of each list of which it needs one.
