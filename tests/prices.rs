@@ -163,7 +163,9 @@ fn unused_effects_change_no_image() {
         if let Ok(with) = forced(&full, row.effect) {
             full = with;
         }
-        if thorough() && let Ok(with) = forced(&own, row.effect) {
+        if thorough()
+            && let Ok(with) = forced(&own, row.effect)
+        {
             let share = differing(&expected, &image(&with));
             assert!(share <= 0.001, "{}: {share}", row.name);
         }
@@ -196,7 +198,15 @@ fn measured(scene: &str, parts: usize) -> PriceList {
         ..Settings::for_scene(&scene)
     };
     let mut watch = Quiet { left: parts };
-    measure(&backend, &scene, &smaller(&settings), true, QUICK, &mut watch).expect("prices")
+    measure(
+        &backend,
+        &scene,
+        &smaller(&settings),
+        true,
+        QUICK,
+        &mut watch,
+    )
+    .expect("prices")
 }
 
 #[test]
@@ -204,14 +214,14 @@ fn every_effect_has_a_price_or_a_reason() {
     let list = measured("lecture", usize::MAX);
     assert!(!list.interrupted);
     for Price {
-        row,
+        effect,
         reasons,
         against,
         absent,
         forced,
     } in &list.prices
     {
-        let name = row.name;
+        let name = effect.name();
         if reasons.is_empty() {
             assert_eq!((against.is_none(), *absent), (true, Some(true)), "{name}");
             assert!(forced.is_some(), "{name}");
@@ -227,7 +237,7 @@ fn every_effect_has_a_price_or_a_reason() {
         }
     }
     let lines = |name: &str| {
-        let price = list.prices.iter().find(|price| price.row.name == name);
+        let price = list.prices.iter().find(|price| price.effect.name() == name);
         let against = price.and_then(|price| price.against.clone());
         against.expect(name).expect(name).difference.kernel_lines
     };

@@ -148,7 +148,13 @@ pub(super) fn run(args: &PriceArgs) -> Result<()> {
             false => None,
         };
         progress.finish();
-        if let (Some(code), Some(PriceList { interrupted: true, .. })) = (signals.code(), &effects) {
+        if let (
+            Some(code),
+            Some(PriceList {
+                interrupted: true, ..
+            }),
+        ) = (signals.code(), &effects)
+        {
             return Err(Error::Interrupted(code));
         }
         let quote = Quote {
@@ -258,7 +264,7 @@ fn about(quote: &Quote) -> Value {
     let share = |price: &Price| {
         let cost = price.against.as_ref()?.as_ref().ok()?.difference.cost;
         Some(json!({
-            "name": price.row.name, "share": cost.price / cost.with,
+            "name": price.effect.name(), "share": cost.price / cost.with,
             "low": cost.interval[0] / cost.with, "high": cost.interval[1] / cost.with,
         }))
     };

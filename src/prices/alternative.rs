@@ -62,11 +62,9 @@ fn change(
             settings.geometry = GeometryChoice::List;
             "list"
         }
-        Effect::Pole
-        | Effect::Interior
-        | Effect::Straddle
-        | Effect::Nested
-        | Effect::Priority => return Err(FROM_PLACES.into()),
+        Effect::Pole | Effect::Interior | Effect::Straddle | Effect::Nested | Effect::Priority => {
+            return Err(FROM_PLACES.into());
+        }
         Effect::Nudge | Effect::Ulp => {
             settings.offset = Offset::Exact;
             "--offset exact"

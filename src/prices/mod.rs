@@ -10,7 +10,7 @@ mod standard;
 mod turns;
 
 use crate::backend::Backend;
-use crate::effects::{Effect, Row, table};
+use crate::effects::{Effect, table};
 use crate::error::Result;
 use crate::job::{Job, prepare};
 use crate::scene::Scene;
@@ -34,7 +34,7 @@ pub type Told<T> = std::result::Result<T, String>;
 #[derive(Clone, Debug)]
 pub struct Price {
     /// The effect.
-    pub row: &'static Row,
+    pub effect: Effect,
     /// What asks for it; empty if it is left out.
     pub reasons: Vec<String>,
     /// Of what is in the kernel: against its alternative.
@@ -174,8 +174,8 @@ pub fn measure(
     let all = rows().filter(|(_, reasons)| is_measured(reasons)).count();
     let mut done = 0;
     for (row, reasons) in rows() {
-        let mut price = Price::of(row, reasons);
-        if is_measured(reasons) {
+        let mut price = Price::of(row.effect, reasons);
+        if is_measured(reasons) && watch.goes_on() {
             watch.begin(row.name, done, all);
             done += 1;
             if reasons.is_empty() {
@@ -196,11 +196,7 @@ pub fn measure(
 ///
 /// # Errors
 /// If a standard scene cannot be rendered, or the device fails.
-pub fn measure_all(
-    backend: &Backend,
-    effort: Effort,
-    watch: &mut dyn Watch,
-) -> Result<PriceList> {
+pub fn measure_all(backend: &Backend, effort: Effort, watch: &mut dyn Watch) -> Result<PriceList> {
     let mut prices = Vec::new();
     let mut device = None;
     for (done, row) in table().iter().enumerate() {
@@ -211,7 +207,7 @@ pub fn measure_all(
         let mut own = Bench::new(backend, &job)?;
         device.get_or_insert_with(|| own.device());
         let meter = Meter::new(&mut own, effort)?;
-        let mut price = Price::of(row, &reasons);
+        let mut price = Price::of(row.effect, &reasons);
         if reasons.is_empty() {
             price.forced = force(backend, &job, row.effect, &mut own, meter, watch)?;
         } else {
@@ -232,9 +228,9 @@ pub fn measure_all(
 }
 
 impl Price {
-    fn of(row: &'static Row, reasons: &[String]) -> Self {
+    fn of(effect: Effect, reasons: &[String]) -> Self {
         Self {
-            row,
+            effect,
             reasons: reasons.to_vec(),
             against: None,
             absent: None,

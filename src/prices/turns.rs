@@ -1,14 +1,14 @@
 //! Two kernels in turns.
 
-use std::ops::Range;
 use std::time::Instant;
 
 use super::{Difference, Measured, Watch};
 use crate::backend::Backend;
 use crate::error::Result;
+use crate::film::{Estimate, Film, window_end};
 use crate::job::Job;
-use crate::render::{Renderer, render_quietly};
-use crate::settings::Settings;
+use crate::render::{Control, Renderer};
+use crate::settings::Rect;
 use crate::shader::{Stage, link};
 use crate::statistics::{mean_and_error, student_quantile};
 
@@ -30,7 +30,7 @@ impl Default for Effort {
     }
 }
 
-/// Samples a pixel of a turn, at least: two batches at least tell a variance.
+/// Samples a pixel of a turn, at least.
 const LEAST: u64 = 16;
 /// Samples a pixel of a turn, at most.
 const MOST: u64 = 1 << 16;
@@ -40,8 +40,10 @@ const CONFIDENCE: f64 = 0.95;
 /// A kernel, compiled.
 pub(super) struct Bench {
     renderer: Box<dyn Renderer>,
-    settings: Settings,
-    /// Whether its error can be estimated.
+    crop: Rect,
+    /// The samples of all turns.
+    film: Film,
+    /// Whether their spread tells an error.
     error_bars: bool,
     lines: usize,
     compile_seconds: f64,
@@ -55,7 +57,8 @@ impl Bench {
         let kernel = link(Stage::Path, job.scene(), job.placement(), job.effects())?;
         Ok(Self {
             renderer,
-            settings: job.settings().clone(),
+            crop: job.settings().crop,
+            film: Film::new(job.settings().crop),
             error_bars: job.claims().has_error_bars(),
             lines: kernel.wgsl.lines().count(),
             compile_seconds,
@@ -67,18 +70,40 @@ impl Bench {
         self.renderer.device()
     }
 
-    /// Seconds of these samples, and the relative variance of one of them if that can be told.
-    fn turn(&mut self, samples: Range<u64>) -> Result<(f64, Option<f64>)> {
-        let spp = samples.end - samples.start;
-        let settings = Settings {
-            samples,
-            ..self.settings.clone()
-        };
+    /// Seconds of so many further samples of each pixel.
+    fn turn(&mut self, spp: u64) -> Result<f64> {
+        struct All;
+        impl Control for All {
+            fn proceed(&mut self, _: u64) -> bool {
+                true
+            }
+        }
+        let end = self.film.samples() + spp;
         let begin = Instant::now();
-        let outcome = render_quietly(self.renderer.as_mut(), &settings)?;
-        let seconds = begin.elapsed().as_secs_f64();
-        let error = outcome.estimate.error.filter(|_| self.error_bars);
-        Ok((seconds, error.map(|error| error * error * spp as f64)))
+        while self.film.samples() < end {
+            let start = self.film.samples();
+            let window = self
+                .renderer
+                .render(start..window_end(start, end), &mut All)?;
+            self.film.add(&window);
+        }
+        Ok(begin.elapsed().as_secs_f64())
+    }
+
+    /// Forgets all samples.
+    fn begin_anew(&mut self) {
+        self.film = Film::new(self.crop);
+    }
+
+    /// The relative variance of a sample, where it can be told.
+    fn variance(&self) -> Option<f64> {
+        let error = Estimate::of(&self.film).error.filter(|_| self.error_bars)?;
+        Some(error * error * self.film.samples() as f64)
+    }
+
+    /// Seconds of a million samples if `spp` samples of each pixel take `seconds`.
+    fn per_megasample(&self, seconds: f64, spp: u64) -> f64 {
+        1.0e6 * seconds / (self.crop.pixels() as f64 * spp as f64)
     }
 }
 
@@ -106,23 +131,18 @@ pub(super) struct Meter {
     seconds_per_megasample: f64,
 }
 
-/// Seconds of a million of `spp` samples of each pixel that take `seconds`.
-fn per_megasample(seconds: f64, settings: &Settings, spp: u64) -> f64 {
-    1.0e6 * seconds / (settings.crop.pixels() as f64 * spp as f64)
-}
-
 impl Meter {
     /// Finds out how many samples are long enough; the first of them warm up the device.
     pub(super) fn new(own: &mut Bench, effort: Effort) -> Result<Self> {
         let mut spp = LEAST;
-        own.turn(0..spp)?;
+        own.turn(spp)?;
         loop {
-            let (seconds, _) = own.turn(0..spp)?;
+            let seconds = own.turn(spp)?;
             if seconds >= effort.turn || spp >= MOST {
                 return Ok(Self {
                     rounds: effort.rounds,
                     spp,
-                    seconds_per_megasample: per_megasample(seconds, &own.settings, spp),
+                    seconds_per_megasample: own.per_megasample(seconds, spp),
                 });
             }
             spp *= 2;
@@ -132,7 +152,7 @@ impl Meter {
     /// What is known of the kernel whose turns are so long.
     pub(super) fn kernel(&self, own: &Bench) -> Measured {
         Measured {
-            size: [own.settings.width, own.settings.height],
+            size: [own.crop.width, own.crop.height],
             spp: self.spp,
             seconds_per_megasample: self.seconds_per_megasample,
             lines: own.lines,
@@ -147,27 +167,25 @@ impl Meter {
         against: &mut Bench,
         watch: &dyn Watch,
     ) -> Result<Option<Difference>> {
-        let seconds = |seconds, bench: &Bench| per_megasample(seconds, &bench.settings, self.spp);
         let mut times = [Vec::new(), Vec::new()];
-        let mut variances = [Some(0.0), Some(0.0)];
+        with.begin_anew();
+        against.begin_anew();
         for round in 0..self.rounds {
-            let samples = round * self.spp..(round + 1) * self.spp;
             let order = if round % 2 == 0 { [0, 1] } else { [1, 0] };
             for which in order {
                 if !watch.goes_on() {
                     return Ok(None);
                 }
                 let bench: &mut Bench = if which == 0 { with } else { against };
-                let (taken, variance) = bench.turn(samples.clone())?;
-                times[which].push(seconds(taken, bench));
-                variances[which] = variances[which].zip(variance).map(|(sum, v)| sum + v);
+                let seconds = bench.turn(self.spp)?;
+                times[which].push(bench.per_megasample(seconds, self.spp));
             }
         }
         let differences: Vec<f64> = times[0].iter().zip(&times[1]).map(|(a, b)| a - b).collect();
         let (price, error) = mean_and_error(&differences);
         let t = student_quantile((self.rounds - 1) as f64, CONFIDENCE);
-        let [with_variance, against_variance] = variances;
-        let ratio = with_variance.zip(against_variance).map(|(a, b)| a / b);
+        let variances = with.variance().zip(against.variance());
+        let ratio = variances.map(|(a, b)| a / b);
         Ok(Some(Difference {
             cost: Cost {
                 with: mean_and_error(&times[0]).0,

@@ -149,7 +149,8 @@ fn link_from(
         resolver.add_module(module_path(&path), source(material.wesl));
     }
     for Role { name, file } in effects.roles() {
-        let chosen = sources::ALL.iter().find(|(path, _)| Some(*path) == file);
+        let chosen = file.filter(|path| is_there(path));
+        let chosen = sources::ALL.iter().find(|(path, _)| Some(*path) == chosen);
         if let Some((_, text)) = chosen {
             resolver.add_module(module_path(name), source(text));
         }

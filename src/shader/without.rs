@@ -169,8 +169,7 @@ fn f(@if(lens) x: f32, y: f32) -> f32 {
 @if(lens) @must_use() fn g() { if a { b } }
 @if(lens) const C = 2;
 ";
-        let without = "\
-
+        let without = "
 import package::c;
 struct S {
     
@@ -194,7 +193,9 @@ fn f( y: f32) -> f32 {
     #[test]
     fn functions_of_a_form_are_gone() {
         let text = "fn sample_mirror(a: f32) -> f32 { return a; }\nfn sample_mirrors() {}\n";
-        let code = crate::materials::forms().iter().position(|form| form.name == "mirror");
+        let code = crate::materials::forms()
+            .iter()
+            .position(|form| form.name == "mirror");
         let mirror = Effect::Form(code.expect("a form") as u32);
         assert_eq!(strip(text, mirror), "\nfn sample_mirrors() {}\n");
     }

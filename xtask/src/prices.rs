@@ -31,6 +31,7 @@ pub(crate) fn all(arguments: &[String]) -> Result<(), String> {
     let output = Command::new(program("release"))
         .args(["effects", "--measure", "--all", "--json"])
         .env("NODEVICE_SELECT", "1")
+        .env("MESA_SHADER_CACHE_DISABLE", "true")
         .stderr(Stdio::inherit())
         .output()
         .map_err(|e| e.to_string())?;
@@ -122,7 +123,9 @@ fn table(list: &Value, rows: &[Row]) -> String {
             or_dash(row.variance),
             or_dash(row.variance.map(|v| v * row.ratio[0])),
             row.lines,
-            row.against.as_deref().unwrap_or("nothing: linked in, unused"),
+            row.against
+                .as_deref()
+                .unwrap_or("nothing: linked in, unused"),
         );
     }
     table
@@ -187,7 +190,10 @@ fn picture(rows: &[Row]) -> String {
             TOP - 13.0
         );
     }
-    for (row, y) in rows.iter().zip((0..).map(|i| TOP + LINE * (f64::from(i) + 0.5))) {
+    for (row, y) in rows
+        .iter()
+        .zip((0..).map(|i| TOP + LINE * (f64::from(i) + 0.5)))
+    {
         let [ratio, from, to] = row.ratio.map(x);
         let _ = writeln!(
             svg,
@@ -227,8 +233,15 @@ mod tests {
         assert_eq!(rows.len(), 2);
         assert_eq!(rows[0].ratio, [1.5, 1.25, 1.75]);
         let table = table(&list, &rows);
-        assert!(table.contains("| `a` | +1.00 | +0.500 to +1.50 | x 1.50 | 0.500 | 0.750 | +7 | b |"), "{table}");
+        assert!(
+            table.contains("| `a` | +1.00 | +0.500 to +1.50 | x 1.50 | 0.500 | 0.750 | +7 | b |"),
+            "{table}"
+        );
         let picture = picture(&rows);
-        assert_eq!(picture.matches("class=\"error\"").count(), 2, "a key and a row");
+        assert_eq!(
+            picture.matches("class=\"error\"").count(),
+            2,
+            "a key and a row"
+        );
     }
 }

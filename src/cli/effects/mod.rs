@@ -21,7 +21,9 @@ With --measure every effect has a price: the seconds of a million samples with i
 million samples with its alternative, which run in turns on this device. The alternative of a
 material is a diffuse one of its colour, that of a choice of how to render is the other one, else it
 is nothing. What is left out costs 0 where the kernel is, byte for byte, the one that is linked
-without its sources; `forced` is what it costs linked in and unused. Run it on an idle machine.
+without its sources; forced in, it has the cost of being linked in and unused. Run it on an idle
+machine. `compile` is what linking and compiling took; a driver may have kept what it compiled
+before (Mesa does, unless MESA_SHADER_CACHE_DISABLE=true).
 
 Examples:
   gpu-trace effects my.toml                    what the kernel will hold, and why

@@ -27,14 +27,23 @@ pub(super) fn of_scene(args: &EffectsArgs, loaded: &Loaded, settings: &Settings)
         None => prices::smaller(settings),
     };
     let list = run(&args.render, |backend, watch| {
-        measure(backend, &loaded.scene, &settings, true, Effort::default(), watch)
+        measure(
+            backend,
+            &loaded.scene,
+            &settings,
+            true,
+            Effort::default(),
+            watch,
+        )
     })?;
     show(args, &loaded.name, list)
 }
 
 /// Measures all effects of the program.
 pub(super) fn all(args: &EffectsArgs) -> Result<()> {
-    let list = run(&args.render, |backend, watch| measure_all(backend, Effort::default(), watch))?;
+    let list = run(&args.render, |backend, watch| {
+        measure_all(backend, Effort::default(), watch)
+    })?;
     show(args, "each effect on a ball of its own", list)
 }
 
@@ -47,7 +56,14 @@ pub(in super::super) fn shares(
     progress: &Progress,
 ) -> Result<PriceList> {
     let mut display = Display::new(signals, progress);
-    measure(backend, &loaded.scene, settings, false, Effort::default(), &mut display)
+    measure(
+        backend,
+        &loaded.scene,
+        settings,
+        false,
+        Effort::default(),
+        &mut display,
+    )
 }
 
 /// A list, and how the signals left it.
@@ -147,7 +163,7 @@ fn document(scene: &str, list: &PriceList) -> Value {
 fn row_json(price: &Price) -> Value {
     let used = !price.reasons.is_empty();
     let mut row = json!({
-        "name": price.row.name, "what": price.row.what, "used": used, "reasons": price.reasons,
+        "name": price.effect.name(), "what": price.effect.row().what, "used": used, "reasons": price.reasons,
         "seconds_per_megasample": null, "low": null, "high": null, "kernel_lines": null,
     });
     match &price.against {
@@ -218,11 +234,11 @@ fn text(name: &str, list: &PriceList) -> String {
     }
     let used = || list.prices.iter().filter(|price| price.against.is_some());
     let forced = || list.prices.iter().filter(|price| price.forced.is_some());
-    let names = list.prices.iter().map(|price| price.row.name.len());
+    let names = list.prices.iter().map(|price| price.effect.name().len());
     let width = names.max().unwrap_or(0);
     if used().next().is_some() {
         text += "\nPrice: seconds a million samples, with the effect less with what stands in its place\n\n";
-        text += &heading(width);
+        text += &(heading(width) + "  against\n");
         for price in used() {
             text += &line_of_used(price, width);
         }
@@ -233,19 +249,20 @@ fn text(name: &str, list: &PriceList) -> String {
         let absent = |price: &&Price| price.absent == Some(false);
         let present: Vec<_> = list.prices.iter().filter(absent).collect();
         text += match list.kernel {
-            None => "\nWithout an alternative: linked into the plain ball's kernel, unused\n\n",
+            None => "\nWithout an alternative: linked into the plain ball's kernel, unused\n",
             Some(_) => {
                 "\nLeft out, at the price of 0: the kernel is, byte for byte, the one without their sources.\n\
-                 Forced in, unused:\n\n"
+                 Forced in, unused:\n"
             }
         };
+        text += &(heading(width) + "\n");
         for price in present {
-            let _ = writeln!(text, "  {} IS in the kernel: a defect", price.row.name);
+            let _ = writeln!(text, "  {} IS in the kernel: a defect", price.effect.name());
         }
         for price in forced() {
             let _ = match &price.forced {
-                Some(Ok(d)) => writeln!(text, "  {:width$}{}", price.row.name, columns(d)),
-                Some(Err(why)) => writeln!(text, "  {:width$}  {why}", price.row.name),
+                Some(Ok(d)) => writeln!(text, "  {:width$}{}", price.effect.name(), columns(d)),
+                Some(Err(why)) => writeln!(text, "  {:width$}  {why}", price.effect.name()),
                 None => Ok(()),
             };
         }
@@ -270,11 +287,11 @@ fn heading(width: usize) -> String {
     for (title, width) in titles.iter().zip(FIGURES) {
         let _ = write!(text, "{title:>width$}");
     }
-    text + "  against\n"
+    text
 }
 
 fn line_of_used(price: &Price, width: usize) -> String {
-    let name = price.row.name;
+    let name = price.effect.name();
     match price.against.as_ref() {
         None => String::new(),
         Some(Err(why)) => format!("  {name:width$}  no price: {why}\n"),
@@ -332,9 +349,12 @@ pub(in super::super) fn shares_text(list: &PriceList) -> String {
     let mut rows: Vec<(&str, &Told<Against>)> = list
         .prices
         .iter()
-        .filter_map(|price| Some((price.row.name, price.against.as_ref()?)))
+        .filter_map(|price| Some((price.effect.name(), price.against.as_ref()?)))
         .collect();
-    let price = |told: &Told<Against>| told.as_ref().map_or(f64::NEG_INFINITY, |a| a.difference.cost.price);
+    let price = |told: &Told<Against>| {
+        told.as_ref()
+            .map_or(f64::NEG_INFINITY, |a| a.difference.cost.price)
+    };
     rows.sort_by(|a, b| price(b.1).total_cmp(&price(a.1)));
     let width = rows.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
     let mut text = "\n  of a sample's time:\n".to_owned();
