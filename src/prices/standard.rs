@@ -9,6 +9,7 @@ use crate::materials::{
     dielectric::{Dielectric, Glass},
     forms,
 };
+use crate::scene::builtin;
 use crate::scene::load::load_str;
 use crate::scene::{Environment, Gradient, Scene, Sky, Sphere};
 use crate::settings::{
@@ -52,11 +53,11 @@ material = "lamp"
 /// Balls a side of the square that a tree is for.
 const SIDE: i32 = 20;
 
-/// The scene and settings in which `effect` is priced. What asks for it is there, but for those effects that
-/// follow from where spheres are, and for `adaptive`: their scene is the plain ball.
+/// The scene and settings in which `effect` is priced: the ball, or the lecture's room for what ends long paths. What
+/// asks for it is there, but for those effects that follow from where spheres are, and for `adaptive`: their scene is the plain ball.
 ///
 /// # Panics
-/// If the plain ball is no scene.
+/// If one of the program's own scenes is none.
 #[must_use]
 pub fn standard(effect: Effect) -> (Scene, Settings) {
     let loaded = load_str("ball", BALL).unwrap_or_else(|e| panic!("{e}"));
@@ -109,6 +110,14 @@ pub fn standard(effect: Effect) -> (Scene, Settings) {
                 termination: DEFAULT_TERMINATION,
             };
         }
+        // It ends long paths: those of a room.
+        Effect::Roulette => {
+            scene = builtin::resolve(None)
+                .unwrap_or_else(|e| panic!("{e}"))
+                .scene;
+            (scene.width, scene.height) = (settings.width, settings.height);
+            settings.max_bounces = Settings::for_scene(&scene).max_bounces;
+        }
         Effect::Table => settings.light_sampling = LightSampling::Cone,
         Effect::Baked
         | Effect::Pole
@@ -122,8 +131,7 @@ pub fn standard(effect: Effect) -> (Scene, Settings) {
         | Effect::Environment
         | Effect::Lights
         | Effect::Projected
-        | Effect::Mis
-        | Effect::Roulette => {}
+        | Effect::Mis => {}
     }
     (scene, settings)
 }

@@ -59,6 +59,8 @@ struct Row {
     price: [f64; 3],
     /// Time of a sample over that with the alternative, with the interval.
     ratio: [f64; 3],
+    /// Decimal places of the price that matter beside the time of a sample.
+    places: usize,
     variance: Option<f64>,
     lines: i64,
 }
@@ -84,6 +86,7 @@ fn rows(list: &Value) -> Vec<Row> {
                 against,
                 price,
                 ratio: price.map(|price| 1.0 + price / other),
+                places: (3.0 - other.log10().floor()).clamp(0.0, 9.0) as usize,
                 variance: number("variance_ratio"),
                 lines: figures["kernel_lines"].as_i64()?,
             })
@@ -111,9 +114,8 @@ fn table(list: &Value, rows: &[Row]) -> String {
         text("driver")
     );
     for row in rows {
-        let sign = |x: f64| if x < 0.0 { "" } else { "+" };
-        let signed = |x: f64| format!("{}{}", sign(x), digits(x));
-        let [price, low, high] = row.price.map(signed);
+        let places = row.places;
+        let [price, low, high] = row.price.map(|x| format!("{x:+.places$}"));
         let or_dash = |x: Option<f64>| x.map_or_else(String::new, digits);
         let _ = writeln!(
             table,
@@ -234,7 +236,7 @@ mod tests {
         assert_eq!(rows[0].ratio, [1.5, 1.25, 1.75]);
         let table = table(&list, &rows);
         assert!(
-            table.contains("| `a` | +1.00 | +0.500 to +1.50 | x 1.50 | 0.500 | 0.750 | +7 | b |"),
+            table.contains("| `a` | +1.000 | +0.500 to +1.500 | x 1.50 | 0.500 | 0.750 | +7 | b |"),
             "{table}"
         );
         let picture = picture(&rows);

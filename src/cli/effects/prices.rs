@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use serde_json::{Value, json};
 
 use super::super::args::RenderArgs;
-use super::super::format::{duration, percent, significant};
+use super::super::format::{duration, significant};
 use super::super::print;
 use super::super::signals::Signals;
 use super::{EffectsArgs, print_json};
@@ -14,8 +14,7 @@ use crate::backend::Backend;
 use crate::error::{Error, Result};
 use crate::output::{Progress, Snapshot};
 use crate::prices::{
-    self, Against, Difference, Effort, Measured, Price, PriceList, Told, Watch, measure,
-    measure_all,
+    self, Against, Difference, Effort, Measured, Price, PriceList, Watch, measure, measure_all,
 };
 use crate::scene::Loaded;
 use crate::settings::Settings;
@@ -315,6 +314,9 @@ fn what(against: &Against) -> String {
 
 fn columns(difference: &Difference) -> String {
     let cost = &difference.cost;
+    // As many for all of a row: those that matter beside the time of a sample.
+    let places = (3.0 - cost.with.max(cost.against).log10().floor()).clamp(0.0, 9.0) as usize;
+    let signed = |seconds: f64| format!("{seconds:+.places$}");
     let [low, high] = cost.interval.map(signed);
     let ratio = |ratio: Option<f64>| ratio.map_or_else(|| "-".to_owned(), significant);
     let times = cost.variance_ratio.map(|v| v * cost.with / cost.against);
@@ -334,43 +336,126 @@ fn columns(difference: &Difference) -> String {
     text
 }
 
-/// As in `+0.0123`.
-fn signed(number: f64) -> String {
-    let sign = if number < 0.0 { '-' } else { '+' };
-    format!("{sign}{}", significant(number.abs()))
-}
-
 fn percent_rounded(share: f64) -> String {
     format!("{:.0} %", 100.0 * share)
 }
 
 /// What `price` says of the effects: those with a price, the dearest first.
 pub(in super::super) fn shares_text(list: &PriceList) -> String {
-    let mut rows: Vec<(&str, &Told<Against>)> = list
-        .prices
-        .iter()
-        .filter_map(|price| Some((price.effect.name(), price.against.as_ref()?)))
-        .collect();
-    let price = |told: &Told<Against>| {
-        told.as_ref()
-            .map_or(f64::NEG_INFINITY, |a| a.difference.cost.price)
-    };
-    rows.sort_by(|a, b| price(b.1).total_cmp(&price(a.1)));
+    let told = list.prices.iter().filter_map(|price| {
+        let against = price.against.as_ref()?.as_ref().ok()?;
+        Some((price.effect.name(), against))
+    });
+    let mut rows: Vec<(&str, &Against)> = told.collect();
+    let share = |against: &Against| against.difference.cost.price / against.difference.cost.with;
+    rows.sort_by(|a, b| share(b.1).total_cmp(&share(a.1)));
     let width = rows.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
-    let mut text = "\n  of a sample's time:\n".to_owned();
-    for (name, told) in rows {
-        if let Ok(against) = told {
-            let cost = &against.difference.cost;
-            let share = |seconds: f64| percent(seconds / cost.with);
-            let _ = writeln!(
-                text,
-                "  {name:width$}  {:>8}  ({} to {}), against {}",
-                share(cost.price),
-                share(cost.interval[0]),
-                share(cost.interval[1]),
-                what(against)
-            );
-        }
+    let mut text =
+        "\n  of a sample's time, less what stands in its place takes (below 0: what it saves)\n"
+            .to_owned();
+    for (name, against) in rows {
+        let cost = &against.difference.cost;
+        let [low, high] = cost.interval.map(|end| percent_rounded(end / cost.with));
+        let _ = writeln!(
+            text,
+            "  {name:width$}{:>8}  {:<20}  against {}",
+            percent_rounded(share(against)),
+            format!("{low} to {high}"),
+            what(against)
+        );
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::Effect;
+    use crate::prices::Cost;
+
+    fn list() -> PriceList {
+        let difference = Difference {
+            cost: Cost {
+                with: 0.5,
+                against: 0.4,
+                price: 0.1,
+                interval: [0.05, 0.15],
+                variance_ratio: Some(0.5),
+            },
+            kernel_lines: 7,
+            compile_seconds: 0.25,
+        };
+        let price = |effect, against, forced| Price {
+            effect,
+            reasons: match &against {
+                Some(_) => vec!["a reason".into()],
+                None => vec![],
+            },
+            absent: against.is_none().then_some(true),
+            against,
+            forced,
+        };
+        let lens = Against {
+            what: "a pinhole".into(),
+            without: vec!["mis"],
+            instead: vec!["table"],
+            difference,
+        };
+        PriceList {
+            device: ("a".into(), "b".into(), "c".into()),
+            kernel: None,
+            prices: vec![
+                price(Effect::Lens, Some(Ok(lens)), None),
+                price(Effect::Pole, Some(Err("it cannot".into())), None),
+                price(Effect::Sky, None, Some(Err("it has not".into()))),
+                price(Effect::Classes, None, Some(Ok(difference))),
+            ],
+            rounds: 8,
+            interrupted: true,
+        }
+    }
+
+    #[test]
+    fn a_line_for_each_effect() {
+        let text = text("scene", &list());
+        let line = |name: &str| {
+            let mut lines = text.lines();
+            let line = lines.find(|line| line.trim_start().starts_with(name));
+            let words: Vec<_> = line.expect(name).split_whitespace().collect();
+            words.join(" ")
+        };
+        let figures = "+0.1000 +0.0500 to +0.1500 20 % 0.500 0.625 +7 +0.25 s";
+        let lens = format!("lens {figures} a pinhole, without mis, with table");
+        assert_eq!(line("lens"), lens);
+        assert_eq!(line("pole"), "pole no price: it cannot");
+        assert_eq!(line("sky"), "sky it has not");
+        assert_eq!(line("classes"), format!("classes {figures}"));
+        assert!(text.ends_with("the rest was not measured.\n"));
+        let shares = shares_text(&list());
+        assert!(shares.contains("20 %  10 % to 30 %"), "{shares}");
+        assert_eq!(shares.lines().count(), 3, "{shares}");
+    }
+
+    #[test]
+    fn json_has_what_the_text_has() {
+        let document = document("scene", &list());
+        let effects = document["effects"].as_array().expect("a list");
+        let row = |name: &str| effects.iter().find(|row| row["name"] == name).expect(name);
+        let lens = row("lens");
+        assert_eq!(lens["seconds_per_megasample"], 0.1);
+        assert_eq!([&lens["low"], &lens["high"]], [0.05, 0.15]);
+        assert_eq!(
+            (&lens["used"], &lens["kernel_lines"]),
+            (&json!(true), &json!(7))
+        );
+        assert_eq!(row("pole")["no_price"], "it cannot");
+        assert!(row("pole")["seconds_per_megasample"].is_null());
+        let classes = row("classes");
+        assert_eq!(
+            (&classes["used"], &classes["seconds_per_megasample"]),
+            (&json!(false), &json!(0.0))
+        );
+        assert_eq!(classes["forced"]["kernel_lines"], 7);
+        assert_eq!(row("sky")["not_forced"], "it has not");
+    }
 }
