@@ -5,6 +5,7 @@
 //! of several rounds. Nothing is asserted.
 
 mod loading;
+mod materials;
 #[expect(dead_code, reason = "f64 is for `hazards` and the tests")]
 mod naive;
 mod offsets;
@@ -49,6 +50,9 @@ fn main() {
     if chosen("geometry") {
         geometry_forms();
     }
+    if chosen("materials") {
+        materials::run();
+    }
     if chosen("trees") {
         trees::run();
     }
@@ -90,7 +94,7 @@ fn ours(
     if !with.is_empty() {
         let effect =
             |name: &&str| Effect::named(name).unwrap_or_else(|| panic!("no effect {name}"));
-        job = job.with_effects(&with.iter().map(effect).collect::<Vec<_>>());
+        job = job.with_effects(&with.iter().map(effect).collect::<Vec<_>>(), "forced");
     }
     let gpu = device::open(&DeviceChoice::Best).unwrap_or_else(|e| panic!("{e}"));
     let mut renderer = GpuRenderer::new(gpu, &job).unwrap_or_else(|e| panic!("{e}"));

@@ -87,11 +87,11 @@ impl Job {
         Claims::of(&self.settings, self.variance.class)
     }
 
-    /// The same with effects in the kernel that nothing asks for, to measure what they cost.
+    /// The same with effects in the kernel that nothing asks for, to measure what they cost; `why` is the reason
+    /// given for them.
     #[must_use]
-    pub fn with_effects(mut self, more: &[Effect]) -> Self {
-        let all: Vec<Effect> = self.effects.used().chain(more.iter().copied()).collect();
-        self.effects = Effects::of(&all);
+    pub fn with_effects(mut self, more: &[Effect], why: &str) -> Self {
+        self.effects = self.effects.with(more, why);
         self
     }
 }

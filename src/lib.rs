@@ -24,7 +24,7 @@
 //! 11. [`image`](mod@image): what is written and read. [`output`]: images, statistics, progress.
 //! 12. [`input`] and [`compare`](mod@compare): images of any origin, and how far two are apart.
 //!
-//! [`study`] measures what accuracy costs in time.
+//! [`study`] measures what accuracy costs in time, [`prices`] what each effect does.
 //! [`check`] measures the hard cases of all this on a device, with the tests of [`statistics`]; what it shares
 //! with `tests/` is [`verify`].
 //! [`numbers`] is how people read them. [`error`] is what can go wrong anywhere.
@@ -51,6 +51,7 @@ mod numpy;
 pub mod output;
 pub mod particles;
 pub mod placement;
+pub mod prices;
 pub mod reference;
 pub mod render;
 pub mod sampler;

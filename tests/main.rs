@@ -49,6 +49,7 @@ mod particles;
 mod placement;
 mod powers;
 mod price;
+mod prices;
 mod projected;
 mod references;
 mod reflective;

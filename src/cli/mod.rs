@@ -74,14 +74,9 @@ enum Command {
     /// Render on many machines: write a job of many tasks and the merge after them, and submit both.
     #[command(subcommand)]
     Submit(SubmitCommand),
-    /// List what the kernel of a scene holds, which object asked for it, and what is left out.
-    Effects {
-        #[command(flatten)]
-        render: Box<RenderArgs>,
-        /// Print JSON.
-        #[arg(long)]
-        json: bool,
-    },
+    /// List what the kernel of a scene holds, which object asked for it, what is left out, and what each costs.
+    #[command(after_help = effects::AFTER_HELP)]
+    Effects(Box<effects::EffectsArgs>),
     /// Forecast the samples and seconds that an error will cost, from a short pilot.
     #[command(after_help = price::AFTER_HELP)]
     Price(Box<price::PriceArgs>),
@@ -181,7 +176,7 @@ fn run(cli: Cli) -> Result<()> {
         Some(Command::Resume(args)) => render::resume(&args),
         Some(Command::Merge(args)) => render::merge(&args),
         Some(Command::Submit(SubmitCommand::Slurm(args))) => submit::run(&args),
-        Some(Command::Effects { render, json }) => effects::run(&render, json),
+        Some(Command::Effects(args)) => effects::run(&args),
         Some(Command::Price(args)) => price::run(&args),
         Some(Command::Check(args)) => check::run(&args),
         Some(Command::Compare(args)) => compare::run(&args),

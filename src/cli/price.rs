@@ -8,6 +8,7 @@ use serde_json::{Value, json};
 
 use super::args::RenderArgs;
 use super::choices::{self, Wanted};
+use super::effects::{shares, shares_text};
 use super::format::{duration, percent, significant};
 use super::signals::Signals;
 use super::{print, values};
@@ -16,6 +17,7 @@ use crate::error::{Error, Result};
 use crate::forecast::{self, Forecast, Pilot};
 use crate::job::prepare;
 use crate::output::Progress;
+use crate::prices::{Price, PriceList, smaller};
 use crate::settings::{MAXIMUM_SPP, Rect, Settings};
 
 pub(super) const AFTER_HELP: &str = "\
@@ -26,6 +28,7 @@ Examples:
   gpu-trace price my.toml --error 1%           to 1 %
   gpu-trace price my.toml --time 10m           the error that ten minutes buy
   gpu-trace price glass --backends gpu,cpu     on both
+  gpu-trace price glass --by-effect            and which effects the time goes to
 
 Seconds are those of rendering alone: setup and compilation are given apart. The interval holds
 95 % of such renders, as far as the pilot can tell: light that it has not seen, as of a rare
@@ -68,6 +71,9 @@ pub(super) struct PriceArgs {
     #[arg(long, value_name = "TIME", value_parser = values::time, default_value = "5s",
           help_heading = "How long")]
     pub(super) pilot: Duration,
+    /// Measure which effects the time goes to, as `effects --measure` does: it takes as long again.
+    #[arg(long, help_heading = "Output")]
+    pub(super) by_effect: bool,
     /// Print JSON.
     #[arg(long, help_heading = "Output")]
     pub(super) json: bool,
@@ -83,6 +89,8 @@ struct Quote {
     host_bytes: u64,
     device_bytes: u64,
     pilot: Pilot,
+    /// What the time goes to, if that was asked for.
+    effects: Option<PriceList>,
 }
 
 /// Runs `price`.
@@ -132,6 +140,23 @@ pub(super) fn run(args: &PriceArgs) -> Result<()> {
                 "the pilot on {device} has seen no light that varies: errors cannot be forecast"
             ));
         }
+        let effects = match args.by_effect {
+            true => {
+                let settings = smaller(settings);
+                Some(shares(&backend, &loaded, &settings, &signals, &progress)?)
+            }
+            false => None,
+        };
+        progress.finish();
+        if let (
+            Some(code),
+            Some(PriceList {
+                interrupted: true, ..
+            }),
+        ) = (signals.code(), &effects)
+        {
+            return Err(Error::Interrupted(code));
+        }
         let quote = Quote {
             backend: backend.kind().name(),
             device,
@@ -140,9 +165,13 @@ pub(super) fn run(args: &PriceArgs) -> Result<()> {
             host_bytes: backend.pixel_bytes(settings) as u64 * pilot.pixels,
             device_bytes: renderer.device_bytes(),
             pilot,
+            effects,
         };
         if !args.json {
             print(&table(render, &quote, settings))?;
+            if let Some(list) = &quote.effects {
+                print(&shares_text(list))?;
+            }
         }
         quotes.push(quote);
     }
@@ -232,7 +261,17 @@ fn targets(args: &RenderArgs, quote: &Quote, settings: &Settings) -> Vec<Value> 
 }
 
 fn about(quote: &Quote) -> Value {
+    let share = |price: &Price| {
+        let cost = price.against.as_ref()?.as_ref().ok()?.difference.cost;
+        Some(json!({
+            "name": price.effect.name(), "share": cost.price / cost.with,
+            "low": cost.interval[0] / cost.with, "high": cost.interval[1] / cost.with,
+        }))
+    };
+    let effects = quote.effects.as_ref();
+    let effects = effects.map(|list| list.prices.iter().filter_map(share).collect::<Vec<_>>());
     json!({
+        "effects": effects,
         "backend": quote.backend, "device": quote.device,
         "paths_per_second": 1.0 / quote.pilot.path_seconds.value,
         "host_bytes": quote.host_bytes, "device_bytes": quote.device_bytes,

@@ -283,6 +283,18 @@ impl Effects {
         Self { reasons }
     }
 
+    /// The same and `more`, for the reason `why`.
+    #[must_use]
+    pub fn with(&self, more: &[Effect], why: &str) -> Self {
+        let mut with = self.clone();
+        for (row, reasons) in table().iter().zip(&mut with.reasons) {
+            if more.contains(&row.effect) {
+                reasons.push(why.to_owned());
+            }
+        }
+        with
+    }
+
     /// Exactly these effects, for tests of the linker.
     #[must_use]
     pub fn of(effects: &[Effect]) -> Self {
@@ -309,6 +321,14 @@ impl Effects {
     /// All effects, used or not, with what asked for each.
     pub fn rows(&self) -> impl Iterator<Item = (&'static Row, &[String])> {
         table().iter().zip(self.reasons.iter().map(Vec::as_slice))
+    }
+
+    /// What asked for an effect; empty if nothing did.
+    #[must_use]
+    pub fn reasons(&self, effect: Effect) -> &[String] {
+        let mut rows = self.rows();
+        let own = rows.find(|(row, _)| row.effect == effect);
+        own.map_or(&[][..], |(_, reasons)| reasons)
     }
 
     /// The effects in use.

@@ -8,6 +8,7 @@ mod bsdf;
 mod names;
 mod sources;
 pub mod steps;
+mod without;
 
 pub use bsdf::members as material_members;
 pub use names::declared_names;
@@ -103,9 +104,38 @@ pub fn link(
     placement: &Placement,
     effects: &Effects,
 ) -> Result<Kernel> {
+    link_from(stage, scene, placement, effects, None)
+}
+
+/// Links the kernel of a render for `scene` with exactly `effects` from sources that have nothing of `effect`,
+/// which is none of them: what costs nothing leaves it as it is.
+///
+/// # Errors
+/// Those of [`link`].
+pub fn link_without(
+    effect: Effect,
+    scene: &Scene,
+    placement: &Placement,
+    effects: &Effects,
+) -> Result<Kernel> {
+    link_from(Stage::Path, scene, placement, effects, Some(effect))
+}
+
+fn link_from(
+    stage: Stage,
+    scene: &Scene,
+    placement: &Placement,
+    effects: &Effects,
+    without: Option<Effect>,
+) -> Result<Kernel> {
+    let source = |text: &'static str| match without {
+        None => text.into(),
+        Some(effect) => without::strip(text, effect).into(),
+    };
+    let is_there = |path: &str| without.is_none_or(|e| !without::is_own(path, e, effects));
     let mut resolver = VirtualResolver::new();
-    for (path, text) in sources::ALL {
-        resolver.add_module(module_path(path), (*text).into());
+    for (path, text) in sources::ALL.iter().filter(|(path, _)| is_there(path)) {
+        resolver.add_module(module_path(path), source(text));
     }
     // Of those in use only: nothing can ask for another one.
     for material in materials::ALL {
@@ -116,12 +146,13 @@ pub fn link(
             continue;
         }
         let path = format!("materials/{}", material.module);
-        resolver.add_module(module_path(&path), material.wesl.into());
+        resolver.add_module(module_path(&path), source(material.wesl));
     }
     for Role { name, file } in effects.roles() {
-        let source = sources::ALL.iter().find(|(path, _)| Some(*path) == file);
-        if let Some((_, text)) = source {
-            resolver.add_module(module_path(name), (*text).into());
+        let chosen = file.filter(|path| is_there(path));
+        let chosen = sources::ALL.iter().find(|(path, _)| Some(*path) == chosen);
+        if let Some((_, text)) = chosen {
+            resolver.add_module(module_path(name), source(text));
         }
     }
     resolver.add_module(module_path("bsdf"), bsdf::module(effects).into());

@@ -117,10 +117,14 @@ impl Crowd {
             let d = point(random);
             return vec![rows(Vec3::ZERO, None, DVec3::ZERO, d, None)];
         }
-        // Squares of its products with what a sphere is made of have to be numbers of f32.
+        // Squares of its products with what a sphere is made of have to be numbers of f32, and those with the least
+        // radius normal ones, also in their last places: where a device takes smaller ones for 0, the discriminant of
+        // a ray that just misses is that of one that touches.
         let extent = |(center, radius): &(Vec3, f32)| f64::from(center.length() + radius);
         let extent = self.balls.iter().map(extent).fold(1.0, f64::max);
-        let longest = (17.0 - extent.log10()).min(15.0);
+        let least = self.balls.iter().map(|(_, radius)| f64::from(*radius));
+        let least = least.fold(1.0, f64::min);
+        let lengths = [-15.0 - least.log10(), (17.0 - extent.log10()).min(15.0)];
         let kinds = if within { 8 } else { 6 };
         (0..count)
             .map(|i| {
@@ -195,16 +199,16 @@ impl Crowd {
                         rows(center.as_vec3(), Some(from), offset, d, Some(from))
                     }
                 };
-                scaled(ray, longest, random)
+                scaled(ray, lengths, random)
             })
             .collect()
     }
 }
 
-/// One in four with a direction of another length.
-fn scaled(mut ray: RayRows, longest: f64, random: &mut Random) -> RayRows {
+/// One in four with a direction of another length, between these powers of ten.
+fn scaled(mut ray: RayRows, [shortest, longest]: [f64; 2], random: &mut Random) -> RayRows {
     if random.unit() < 0.25 {
-        let length = random.magnitude(-15.0, longest) as f32;
+        let length = random.magnitude(shortest, longest) as f32;
         for axis in &mut ray[2][..3] {
             *axis *= length;
         }

@@ -12,6 +12,7 @@ Usage: cargo xtask bench [TABLE...] [--quick]
   unused     effects that a scene does not use
   offsets    ways to leave a surface: what each gets wrong, and costs
   geometry   spheres as constants or in a buffer
+  materials  seven balls of each material against diffuse ones
   trees      a loop over all spheres against a tree, for 32 to 1e6 of them
   roofline   the peak of the ray-sphere test on the device, and what share of it scenes reach
   loading    from a scene file to the first dispatch: each stage for 1e3, 1e4 and 1e5 spheres
@@ -29,10 +30,11 @@ Without a name: all but forecasts, peers, hazards and coverage. Run it on an idl
 
 /// Runs the benchmarks named in `tables`.
 pub(crate) fn all(tables: &[String]) -> Result<(), String> {
-    const KNOWN: [&str; 12] = [
+    const KNOWN: [&str; 13] = [
         "naive",
         "unused",
         "geometry",
+        "materials",
         "trees",
         "roofline",
         "offsets",
@@ -57,7 +59,7 @@ pub(crate) fn all(tables: &[String]) -> Result<(), String> {
     }
     let chosen = |name: &str| tables.is_empty() || tables.iter().any(|t| t == name);
     run(cargo().args(["build", "--release"]))?;
-    let in_process: Vec<&str> = KNOWN[..7]
+    let in_process: Vec<&str> = KNOWN[..8]
         .iter()
         .copied()
         .filter(|name| chosen(name))

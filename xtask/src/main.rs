@@ -5,6 +5,7 @@ mod drivers;
 mod forecasts;
 mod lints;
 mod numerics;
+mod prices;
 #[cfg(unix)]
 mod slurm;
 mod soak;
@@ -22,6 +23,7 @@ Usage: cargo xtask TASK
   bench    run the benchmarks side by side and print their table (--help for its options)
   numerics run `gpu-trace check` on every driver that is there, into the table of docs/numerics.md
            (--help for its options)
+  prices   measure what every effect costs on this device, into docs/effects.md
   slurm    start a Slurm on this machine, which has to be installed, and run the tests of
            `submit slurm` on it
   soak     render for 30 minutes, or as many as are named, and fail if memory grows
@@ -34,6 +36,7 @@ fn main() -> ExitCode {
     let done = match task.as_deref() {
         Some("test") => test::all(&rest),
         Some("numerics") => numerics::all(&rest),
+        Some("prices") => prices::all(&rest),
         Some("bench") => bench::all(&rest),
         #[cfg(unix)]
         Some("slurm") => slurm::all(&rest),

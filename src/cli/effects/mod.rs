@@ -1,0 +1,114 @@
+//! `gpu-trace effects`: what is in the kernel, why, and what is left out; and what each costs.
+
+mod prices;
+
+use std::fmt::Write as _;
+
+use clap::Args;
+
+use super::args::RenderArgs;
+use super::print;
+use crate::effects::Effects;
+use crate::error::{Error, Result};
+use crate::job::prepare;
+use crate::output::{atomic, check_all};
+use crate::shader::{Stage, link};
+
+pub(super) use prices::{shares, shares_text};
+
+pub(super) const AFTER_HELP: &str = "\
+With --measure every effect has a price: the seconds of a million samples with it, less those of a
+million samples with its alternative, which run in turns on this device. The alternative of a
+material is a diffuse one of its colour, that of a choice of how to render is the other one, else it
+is nothing. What is left out costs 0 where the kernel is, byte for byte, the one that is linked
+without its sources; forced in, it has the cost of being linked in and unused. Run it on an idle
+machine. `compile` is what linking and compiling took; a driver may have kept what it compiled
+before (Mesa does, unless MESA_SHADER_CACHE_DISABLE=true).
+
+Examples:
+  gpu-trace effects my.toml                    what the kernel will hold, and why
+  gpu-trace effects my.toml --measure          what each effect costs, some two minutes
+  gpu-trace effects --measure --all            the price list: every effect on a scene of its own";
+
+/// The options of `effects`.
+#[derive(Clone, Debug, Args)]
+pub(super) struct EffectsArgs {
+    #[command(flatten)]
+    pub(super) render: RenderArgs,
+    /// Print JSON.
+    #[arg(long, help_heading = "Output")]
+    pub(super) json: bool,
+    /// Measure what each effect costs on this device.
+    #[arg(long, conflicts_with = "crop", help_heading = "Prices")]
+    pub(super) measure: bool,
+    /// Of all effects, each on a scene of its own: a ball under a lamp.
+    #[arg(
+        long,
+        requires = "measure",
+        conflicts_with_all = [
+            "scene", "size", "integrator", "light_sampling", "sampler", "max_bounces", "roulette",
+            "termination", "offset", "geometry", "aov", "view", "adaptive", "spp", "error", "time",
+            "sample_range", "dump_wgsl",
+        ],
+        help_heading = "Prices"
+    )]
+    pub(super) all: bool,
+}
+
+/// Runs `effects`.
+pub(super) fn run(args: &EffectsArgs) -> Result<()> {
+    if args.all {
+        return prices::all(args);
+    }
+    let render = &args.render;
+    let loaded = render.load()?;
+    let settings = render.settings(&loaded.scene)?;
+    let job = prepare(&loaded.scene, &settings)?;
+    let effects = job.effects();
+    let kernel = link(Stage::Path, job.scene(), job.placement(), effects)?;
+    if let Some(path) = &render.dump_wgsl {
+        check_all(&[path], &loaded.inputs())?;
+        atomic::write(path, kernel.wgsl.as_bytes())?;
+    }
+    if args.measure {
+        return prices::of_scene(args, &loaded, &settings);
+    }
+    let lines = kernel.wgsl.lines().count();
+    if args.json {
+        let rows: Vec<_> = effects
+            .rows()
+            .map(|(row, reasons)| {
+                let (name, what, used) = (row.name, row.what, !reasons.is_empty());
+                serde_json::json!({
+                    "name": name, "used": used, "what": what, "reasons": reasons,
+                })
+            })
+            .collect();
+        return print_json(&serde_json::json!({
+            "scene": loaded.name, "geometry": effects.geometry(), "kernel_lines": lines,
+            "effects": rows,
+        }));
+    }
+    print(&table(&loaded.name, effects, lines))
+}
+
+fn print_json(value: &serde_json::Value) -> Result<()> {
+    let text = serde_json::to_string_pretty(value)
+        .map_err(|e| Error::Usage(format!("cannot write JSON: {e}")))?;
+    print(&(text + "\n"))
+}
+
+fn table(scene: &str, effects: &Effects, lines: usize) -> String {
+    let mut text = format!("{scene}: a kernel of {lines} lines\n\nIn the kernel\n");
+    let width = effects.rows().map(|(row, _)| row.name.len()).max();
+    let width = width.unwrap_or(0);
+    for (row, reasons) in effects.rows().filter(|(_, r)| !r.is_empty()) {
+        let _ = writeln!(text, "  {:width$}  {}", row.name, row.what);
+        let _ = writeln!(text, "  {:width$}    for {}", "", reasons.join("; "));
+    }
+    text += "\nLeft out\n";
+    for (row, _) in effects.rows().filter(|(_, r)| r.is_empty()) {
+        let _ = writeln!(text, "  {:width$}  {}", row.name, row.what);
+    }
+    text
+}

@@ -1,0 +1,181 @@
+//! What an effect is measured against.
+
+use glam::DVec3;
+
+use super::Told;
+use crate::effects::{BAKED_MOST, Effect};
+use crate::job::{Job, prepare};
+use crate::materials::{MaterialKind, dielectric::Dielectric, diffuse::Diffuse, forms};
+use crate::sampler::Sampler;
+use crate::scene::Scene;
+use crate::settings::{GeometryChoice, Integrator, LightSampling, Offset, Settings};
+
+/// What stands in an effect's place.
+#[derive(Clone, Debug)]
+pub struct Alternative {
+    /// What it is, in a few words.
+    pub what: String,
+    /// The job with it.
+    pub job: Job,
+}
+
+/// Why an effect of where spheres are has no alternative.
+const FROM_PLACES: &str = "it follows from where the spheres are: a kernel without it is wrong";
+
+/// The alternative of an effect that `job` uses; or why there is none. For a material that is diffuse of its
+/// colour; for a choice of how to render the other one; else nothing.
+///
+/// # Errors
+/// With the reason.
+pub fn alternative(job: &Job, effect: Effect) -> Told<Alternative> {
+    let (mut scene, mut settings) = (job.scene().clone(), job.settings().clone());
+    let what = change(effect, job, &mut scene, &mut settings)?;
+    let other = prepare(&scene, &settings).map_err(|error| error.to_string())?;
+    // It is in no settings that are measured.
+    let keeps = job.effects().has(Effect::Adaptive) && effect != Effect::Adaptive;
+    Ok(Alternative {
+        what: what.to_owned(),
+        job: match keeps {
+            true => other.with_effects(&[Effect::Adaptive], "--adaptive"),
+            false => other,
+        },
+    })
+}
+
+/// Puts the alternative into scene or settings, and says what it is.
+fn change(
+    effect: Effect,
+    job: &Job,
+    scene: &mut Scene,
+    settings: &mut Settings,
+) -> Told<&'static str> {
+    Ok(match effect {
+        Effect::Baked | Effect::List => {
+            settings.geometry = GeometryChoice::Bvh;
+            "bvh"
+        }
+        Effect::Bvh if scene.spheres.len() <= BAKED_MOST => {
+            settings.geometry = GeometryChoice::Baked;
+            "baked"
+        }
+        Effect::Bvh => {
+            settings.geometry = GeometryChoice::List;
+            "list"
+        }
+        Effect::Pole | Effect::Interior | Effect::Straddle | Effect::Nested | Effect::Priority => {
+            return Err(FROM_PLACES.into());
+        }
+        Effect::Nudge | Effect::Ulp => {
+            settings.offset = Offset::Exact;
+            "--offset exact"
+        }
+        Effect::Lens => {
+            scene.camera.aperture_radius = 0.0;
+            "a pinhole"
+        }
+        Effect::Sobol => {
+            settings.sampler = Sampler::Independent;
+            "--sampler independent"
+        }
+        Effect::Classes => {
+            settings.classes = false;
+            "no such layers"
+        }
+        Effect::Features => {
+            settings.features = false;
+            "no such layers"
+        }
+        Effect::BvhCost => {
+            settings.view = None;
+            "light"
+        }
+        Effect::Adaptive => "all tiles alike",
+        Effect::Form(code) => {
+            let form = forms()[code as usize];
+            if job.effects().has(effect) && form.name == crate::materials::diffuse::NAME {
+                return Err("it is what other materials are measured against".into());
+            }
+            replace(scene, |kind| {
+                let is_it = kind.form() == form;
+                let albedo = kind.color().clamp(DVec3::ZERO, DVec3::ONE);
+                is_it.then(|| Diffuse { albedo }.into())
+            });
+            "diffuse of its colour"
+        }
+        Effect::Absorption => {
+            replace(scene, |kind| match kind {
+                MaterialKind::Dielectric(glass) => Some(clear(glass).into()),
+                _ => None,
+            });
+            "clear glass"
+        }
+        Effect::Dispersion => {
+            replace(scene, |kind| match kind {
+                MaterialKind::Dielectric(glass) => Some(of_one_index(glass, kind.ior()).into()),
+                _ => None,
+            });
+            "the index of yellow light for all"
+        }
+        Effect::Emission => {
+            for material in &mut scene.materials {
+                material.emission = DVec3::ZERO;
+            }
+            "lamps that are off"
+        }
+        Effect::Environment | Effect::Gradient | Effect::Sky => {
+            scene.environment = None;
+            "darkness around"
+        }
+        Effect::Lecture => {
+            settings.integrator = Integrator::Path;
+            "--integrator path"
+        }
+        Effect::Lights | Effect::Skylight => {
+            settings.integrator = Integrator::Bsdf;
+            "--integrator bsdf"
+        }
+        Effect::Projected => {
+            settings.light_sampling = LightSampling::Cone;
+            "--light-sampling cone"
+        }
+        Effect::Table if settings.light_sampling == LightSampling::Cone => {
+            settings.light_sampling = LightSampling::Projected;
+            "--light-sampling projected"
+        }
+        Effect::Table => return Err("so many lamps are not weighed at each vertex".into()),
+        Effect::Mis => {
+            settings.integrator = Integrator::Nee;
+            "--integrator nee"
+        }
+        Effect::Roulette => {
+            settings.roulette = false;
+            "--roulette off"
+        }
+    })
+}
+
+/// Puts other materials in the place of those that `other` has something for.
+fn replace(scene: &mut Scene, other: impl Fn(&MaterialKind) -> Option<MaterialKind>) {
+    for material in &mut scene.materials {
+        if let Some(kind) = other(&material.kind) {
+            material.kind = kind;
+        }
+    }
+}
+
+/// The same glass without absorption.
+fn clear(glass: &Dielectric) -> Dielectric {
+    Dielectric {
+        absorption: DVec3::ZERO,
+        ..glass.clone()
+    }
+}
+
+/// The same glass with one index for all wavelengths.
+fn of_one_index(glass: &Dielectric, ior: f64) -> Dielectric {
+    Dielectric {
+        absorption: glass.absorption,
+        roughness: glass.roughness,
+        ..Dielectric::smooth(ior)
+    }
+}
