@@ -1,5 +1,5 @@
 //! `cargo bench --bench coverage`: do 95 % intervals hold the truth in 95 % of all pixels? Prints the
-//! table of `docs/accuracy.md`; words choose scenes, a number the seeds. With the word `trust`: do verdicts find the
+//! table of `docs/accuracy.md`; words choose scenes, a number the seeds. After the word `trust`: do verdicts find the
 //! errors that are not? Nothing is asserted here: that is for `tests/coverage.rs`.
 
 #[expect(dead_code, reason = "the test asks for more")]
@@ -41,8 +41,11 @@ fn main() {
         "device: {} ({}, {}), {seeds} seeds\n",
         s.name, s.backend, s.driver
     );
-    if names.iter().any(|name| *name == "trust") {
-        trust::table(&gpu, seeds);
+    if let Some((_, names)) = names
+        .split_first()
+        .filter(|(word, _)| word.as_str() == "trust")
+    {
+        trust::table(&gpu, seeds, names);
         return;
     }
     println!(

@@ -34,13 +34,16 @@ const CASES: [(&str, u32, u32, Integrator); 15] = [
     ("scenes/tests/heavy-tail.toml", 32, 32, LECTURE),
 ];
 
-/// Prints the table.
-pub(crate) fn table(gpu: &Gpu, seeds: u64) {
+/// Prints the table, of all scenes or of those that are named.
+pub(crate) fn table(gpu: &Gpu, seeds: u64, names: &[&String]) {
     println!(
         "| scene | estimator | spp | off by a quarter or more | of these `doubtful` | within a tenth | of these `good` |\n\
          |---|---|---|---|---|---|---|"
     );
     for (scene_name, width, height, integrator) in CASES {
+        if !names.is_empty() && !names.iter().any(|n| scene_name.contains(n.as_str())) {
+            continue;
+        }
         let loaded = builtin::resolve(Some(scene_name)).unwrap_or_else(|e| panic!("{e}"));
         let settings = Settings {
             width,
