@@ -9,13 +9,15 @@ use crate::common::{gpu, scene_file};
 use gpu_trace::sampler::Sampler;
 use gpu_trace::settings::{Integrator, Settings};
 use gpu_trace::verify::settings;
-use study::{Truth, coverage, runs};
+use study::{Truth, Verdicts, coverage, runs, verdicts};
 
 const SEEDS: u64 = 60;
 const SAMPLES: [u64; 2] = [128, 512];
 
+/// And so are verdicts: errors that are not are `doubtful`.
 #[test]
 fn intervals_hold_the_truth() {
+    let [mut rare_light, mut gallery] = [Verdicts::default(); 2];
     for (name, integrator, sampler) in [
         ("lecture", Integrator::Bsdf, Sampler::Sobol),
         ("lecture", Integrator::Bsdf, Sampler::Independent),
@@ -35,6 +37,15 @@ fn intervals_hold_the_truth() {
         let truth = Truth::of(own.iter());
         for said in &runs.said {
             let c = coverage(said, own, &truth, 1.0);
+            let v = verdicts(said, own, &truth, false);
+            let all = match name {
+                "tests/lamps" => &mut rare_light,
+                _ => &mut gallery,
+            };
+            all.off += v.off;
+            all.doubted += v.doubted;
+            all.close += v.close;
+            all.trusted += v.trusted;
             let spp = said.iter().map(|s| s.samples).sum::<u64>() / SEEDS;
             // Pixels are nearly independent of each other.
             let error = (0.05 * 0.95 / c.count).sqrt();
@@ -72,4 +83,14 @@ fn intervals_hold_the_truth() {
             runs.limit
         );
     }
+    // No verdict is right for both, whatever is rendered: each is the other's companion.
+    eprintln!("rare light: {rare_light:?}; gallery: {gallery:?}");
+    assert!(rare_light.off > 20, "{rare_light:?}");
+    let share = |part: usize, all: usize| part as f64 / all as f64;
+    assert!(
+        share(rare_light.doubted, rare_light.off) > 0.9,
+        "{rare_light:?}"
+    );
+    assert!(gallery.close > 200, "{gallery:?}");
+    assert!(share(gallery.trusted, gallery.close) > 0.95, "{gallery:?}");
 }

@@ -1,9 +1,10 @@
 //! `cargo bench --bench coverage`: do 95 % intervals hold the truth in 95 % of all pixels? Prints the
-//! table of `docs/accuracy.md`; words choose scenes, a number the seeds. Nothing is asserted here: that
-//! is for `tests/coverage.rs`.
+//! table of `docs/accuracy.md`; words choose scenes, a number the seeds. After the word `trust`: do verdicts find the
+//! errors that are not? Nothing is asserted here: that is for `tests/coverage.rs`.
 
 #[expect(dead_code, reason = "the test asks for more")]
 mod study;
+mod trust;
 
 use gpu_trace::gpu::device::{self, DeviceChoice};
 use gpu_trace::sampler::Sampler;
@@ -40,6 +41,13 @@ fn main() {
         "device: {} ({}, {}), {seeds} seeds\n",
         s.name, s.backend, s.driver
     );
+    if let Some((_, names)) = names
+        .split_first()
+        .filter(|(word, _)| word.as_str() == "trust")
+    {
+        trust::table(&gpu, seeds, names);
+        return;
+    }
     println!(
         "| scene | sampler | spp | normal | Student | ours | values below 90 %: Student | ours | \
          error | estimated/actual |\n|---|---|---|---|---|---|---|---|---|---|"

@@ -1,6 +1,6 @@
 //! How often intervals hold the truth: renders of many seeds against what all others agree on.
 
-use gpu_trace::film::{Estimate, Film, half_widths, next_look, window_end};
+use gpu_trace::film::{Estimate, Film, Trust, half_widths, next_look, window_end};
 use gpu_trace::gpu::device::Gpu;
 use gpu_trace::gpu::renderer::GpuRenderer;
 use gpu_trace::job::prepare;
@@ -14,6 +14,7 @@ pub(crate) struct Said {
     pub(crate) samples: u64,
     /// The error that it estimates.
     pub(crate) error: f64,
+    trust: Trust,
     freedom: f64,
     means: Vec<f64>,
     variances: Vec<f64>,
@@ -24,9 +25,11 @@ impl Said {
     fn by(film: &Film) -> Self {
         let all = |of: &dyn Fn(usize) -> [f64; 3]| (0..film.rect().pixels()).flat_map(of).collect();
         let half_widths = half_widths(film).expect("16 batches");
+        let estimate = Estimate::of(film);
         Self {
             samples: film.samples(),
-            error: Estimate::of(film).error.expect("16 batches"),
+            error: estimate.error.expect("16 batches"),
+            trust: estimate.trust.expect("16 batches"),
             freedom: film.freedom().expect("16 batches"),
             means: all(&|i| film.mean(i)),
             variances: all(&|i| film.variance_of_mean(i).expect("16 batches")),
@@ -135,6 +138,45 @@ impl Truth {
     }
 }
 
+/// Verdicts on the errors that renders state.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Verdicts {
+    /// Renders whose stated error is off by a quarter of the actual one or more, and those of them whose verdict is
+    /// `doubtful`.
+    pub(crate) off: usize,
+    pub(crate) doubted: usize,
+    /// Renders whose stated error is within a tenth of it, and those of them whose verdict is `good`.
+    pub(crate) close: usize,
+    pub(crate) trusted: usize,
+}
+
+/// What the verdicts are worth. `own` gives each render's part in the truth, which is taken out; `heavy_tailed`: that
+/// samples are is known of the scene.
+pub(crate) fn verdicts(said: &[Said], own: &[Said], truth: &Truth, heavy_tailed: bool) -> Verdicts {
+    let mut all = Verdicts::default();
+    for (said, own) in said.iter().zip(own) {
+        let ratio = said.error / actual(said, &truth.without(own)).sqrt();
+        let good = said.trust.verdict(heavy_tailed).verdict == "good";
+        if (ratio - 1.0).abs() >= 0.25 {
+            all.off += 1;
+            all.doubted += usize::from(!good);
+        } else if (ratio - 1.0).abs() <= 0.1 {
+            all.close += 1;
+            all.trusted += usize::from(good);
+        }
+    }
+    all
+}
+
+/// The square of a render's actual error, as [`Estimate::error`] has it.
+fn actual(said: &Said, truth: &[f64]) -> f64 {
+    let values = truth.len() as f64;
+    let mean = truth.iter().sum::<f64>() / values;
+    let floor = (0.1 * mean).powi(2);
+    let square = |(m, t): (&f64, &f64)| (m - t).powi(2) / (t * t + floor);
+    said.means.iter().zip(truth).map(square).sum::<f64>() / values
+}
+
 /// Shares of values whose interval holds the truth.
 pub(crate) struct Coverage {
     /// The mean and 1.96 standard errors.
@@ -159,18 +201,16 @@ pub(crate) fn coverage(said: &[Said], own: &[Said], truth: &Truth, scale: f64) -
     // Constant values have no interval.
     let noisy: Vec<usize> = (0..values).filter(|i| truth.variance[*i] > 0.0).collect();
     let mut held = vec![[0u32; 3]; values];
-    let (mut actual, mut estimated) = (0.0, 0.0);
+    let (mut all, mut estimated) = (0.0, 0.0);
     for (said, own) in said.iter().zip(own) {
         let t = [
             student_quantile(f64::INFINITY, 0.95),
             student_quantile(said.freedom, 0.95),
         ];
         let truth_here = truth.without(own);
-        let mean = truth_here.iter().sum::<f64>() / values as f64;
-        let floor = (0.1 * mean).powi(2);
+        all += actual(said, &truth_here) * values as f64;
         for i in 0..values {
             let square = (said.means[i] - truth_here[i]).powi(2);
-            actual += square / (truth_here[i].powi(2) + floor);
             let widths = [
                 t[0] * t[0] * said.variances[i],
                 t[1] * t[1] * said.variances[i],
@@ -200,8 +240,8 @@ pub(crate) fn coverage(said: &[Said], own: &[Said], truth: &Truth, scale: f64) -
         student: share(1),
         ours: share(2),
         poor: [poor(1), poor(2)],
-        honesty: (estimated / actual).sqrt(),
-        error: (actual / (seeds * values as f64)).sqrt(),
+        honesty: (estimated / all).sqrt(),
+        error: (all / (seeds * values as f64)).sqrt(),
         count: seeds * noisy.len() as f64 / 3.0,
     }
 }

@@ -1,6 +1,7 @@
 //! Mean and error of a film.
 
 use super::sums::Film;
+use super::trust::Trust;
 
 /// What a film says about the image.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,6 +17,8 @@ pub struct Estimate {
     /// known where it is. Little more than the error itself, unless a few pixels have most of it: then
     /// others may be as bad, and have not met what makes them so.
     pub error_at_most: Option<f64>,
+    /// Whether the error can be trusted; known where it is.
+    pub trust: Option<Trust>,
 }
 
 /// What a standard normal deviate exceeds in 5 % of all cases.
@@ -39,6 +42,7 @@ impl Estimate {
         }
         // In images of few pixels noise may leave the jackknife less than nothing.
         let best = |[plain, better]: [[f64; 2]; 2]| if better[0] > 0.0 { better } else { plain };
+        let correction = sums.map(|[plain, better]| better[0] / plain[0] - 1.0);
         let sums = sums.map(best);
         let known = |e: &f64| e.is_finite() && floor > 0.0;
         let pixels = count as f64;
@@ -50,10 +54,13 @@ impl Estimate {
                 (mean + UPPER * variance.sqrt()).sqrt()
             })
             .filter(known);
+        let spread = error_at_most.zip(error).map(|(most, error)| most / error);
+        let trust = spread.zip(correction);
         Self {
             mean,
             error,
             error_at_most,
+            trust: trust.map(|(spread, correction)| Trust { spread, correction }),
         }
     }
 
@@ -101,5 +108,7 @@ mod tests {
         let estimate = Estimate::of(&film);
         assert_eq!(estimate.error, Some(plain.sqrt()));
         assert_eq!(estimate.error_at_most, Some(plain.sqrt()));
+        let trust = estimate.trust.expect("an error");
+        assert_eq!((trust.spread, trust.is_good()), (1.0, false), "{trust:?}");
     }
 }

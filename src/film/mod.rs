@@ -4,8 +4,8 @@
 //! 2. [`allocation`]: how samples are shared out over the image.
 //! 3. [`sums`]: f64 sums and variances over all windows.
 //!    [`record`]: these as numbers, and films joined.
-//! 4. [`estimate`]: mean and error. [`intervals`]: those of single values. `adaptive`: where further
-//!    samples go.
+//! 4. [`estimate`]: mean and error. [`trust`]: whether that can be trusted. [`intervals`]: those of single
+//!    values. `adaptive`: where further samples go.
 
 mod adaptive;
 pub mod allocation;
@@ -14,6 +14,7 @@ pub mod estimate;
 pub mod intervals;
 pub mod record;
 pub mod sums;
+pub mod trust;
 pub mod window;
 
 pub use adaptive::PILOT_SAMPLES;
@@ -25,6 +26,7 @@ pub use intervals::half_widths;
 pub use record::{Counts, Record};
 pub use sums::Film;
 pub(crate) use sums::PIXEL_BYTES;
+pub use trust::{Trust, Verdict};
 pub use window::{
     BLOCK, LEAST_SAMPLES, NonFinite, PixelSums, Tally, WINDOW, Window, cut, half_of, next_look,
     window_end,

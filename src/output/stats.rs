@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Metadata, atomic};
 use crate::error::{Action, Error, Result};
-pub use crate::film::NonFinite;
+pub use crate::film::{NonFinite, Verdict};
 pub use crate::ledger::Entry;
 pub use crate::render::StoppedBy;
 pub use crate::variance::VarianceClass;
@@ -62,6 +62,8 @@ pub struct Stats {
     pub rays: u64,
     /// The relative error, a fraction; `null` where unknown.
     pub estimated_error: Option<f64>,
+    /// Whether that can be trusted; `null` where it is unknown.
+    pub trust: Option<Verdict>,
     /// Degrees of freedom of the pixels' standard errors, for Student's t; `null` where these are
     /// unknown.
     pub degrees_of_freedom: Option<f64>,
@@ -165,6 +167,10 @@ impl Stats {
             .with("device", self.device.name.as_str())
             .with("backend", self.device.backend.as_str())
             .with("seconds", self.seconds.total);
+        let metadata = match &self.trust {
+            Some(verdict) => metadata.with("trust", verdict.to_string()),
+            None => metadata,
+        };
         match self.degrees_of_freedom {
             Some(freedom) => metadata.with("degrees_of_freedom", freedom),
             None => metadata,

@@ -11,6 +11,7 @@ pub(crate) fn estimate(film: &Film, error_bars: bool) -> Estimate {
         false => Estimate {
             error: None,
             error_at_most: None,
+            trust: None,
             ..estimate
         },
     }

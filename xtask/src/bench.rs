@@ -24,13 +24,14 @@ Usage: cargo xtask bench [TABLE...] [--quick]
   hazards    how exact the kernel, a plain one and Mitsuba 3 are on scenes that are hard in f32
              (installs as peers does; writes docs/images/hazards.png; takes ten minutes)
   coverage   how often 95 % intervals hold the truth, over 200 seeds (half an hour)
+  trust      how often verdicts on errors are right, over 200 seeds (a quarter of an hour)
 
-Without a name: all but forecasts, peers, hazards and coverage. Run it on an idle machine.
+Without a name: all but forecasts, peers, hazards, coverage and trust. Run it on an idle machine.
 ";
 
 /// Runs the benchmarks named in `tables`.
 pub(crate) fn all(tables: &[String]) -> Result<(), String> {
-    const KNOWN: [&str; 13] = [
+    const KNOWN: [&str; 14] = [
         "naive",
         "unused",
         "geometry",
@@ -44,6 +45,7 @@ pub(crate) fn all(tables: &[String]) -> Result<(), String> {
         "peers",
         "hazards",
         "coverage",
+        "trust",
     ];
     if tables.iter().any(|t| t == "--help" || t == "-h") {
         print!("{USAGE}");
@@ -68,6 +70,11 @@ pub(crate) fn all(tables: &[String]) -> Result<(), String> {
         run(cargo()
             .args(["bench", "--bench", "speed", "--"])
             .args(in_process)
+            .env("NODEVICE_SELECT", "1"))?;
+    }
+    if tables.iter().any(|t| t == "trust") {
+        run(cargo()
+            .args(["bench", "--bench", "coverage", "--", "trust"])
             .env("NODEVICE_SELECT", "1"))?;
     }
     if chosen("resources") {

@@ -6,7 +6,7 @@ use crate::output::Stats;
 use crate::output::stats::{BounceLimit, Device, Seconds};
 use crate::render::Outcome;
 use crate::scene::load::Loaded;
-use crate::variance::energy_cut_at_most;
+use crate::variance::{VarianceClass, energy_cut_at_most};
 
 /// All but what is known at the end: times, warnings, and the ledger.
 pub(super) fn statistics(
@@ -21,6 +21,7 @@ pub(super) fn statistics(
     let samples = film.paths();
     let tally = film.tally();
     let start = settings.samples.start;
+    let heavy_tailed = job.variance().class == VarianceClass::HeavyTailed;
     Stats {
         version: env!("CARGO_PKG_VERSION").into(),
         scene: loaded.name.clone(),
@@ -45,6 +46,10 @@ pub(super) fn statistics(
         paths_per_second: samples as f64 / outcome.elapsed.as_secs_f64(),
         rays: tally.rays,
         estimated_error: outcome.estimate.error,
+        trust: outcome
+            .estimate
+            .trust
+            .map(|trust| trust.verdict(heavy_tailed)),
         degrees_of_freedom: outcome.estimate.error.and_then(|_| film.freedom()),
         variance: job.variance().class,
         black: outcome.estimate.is_black(),

@@ -14,7 +14,11 @@ use crate::variance::VarianceClass;
 /// light.
 pub(super) fn summary(files: &str, stats: &Stats, shown: Option<&str>) -> String {
     let error = match stats.estimated_error {
-        Some(error) => format!("error {}", percent(error)),
+        Some(error) => {
+            let trust = stats.trust.as_ref();
+            let trust = trust.map_or_else(String::new, |verdict| format!(", trust: {verdict}"));
+            format!("error {}{trust}", percent(error))
+        }
         None if stats.black => "black".into(),
         None if stats.variance == VarianceClass::Infinite => {
             "error unknown (infinite variance)".into()
