@@ -43,7 +43,12 @@ fn ratios(mut weight: impl FnMut(&mut Random) -> DVec3, name: &str) -> Ratios {
 fn place() -> (Surface, DVec3) {
     let normal = DVec3::new(2.0, -1.0, 2.0) / 3.0;
     let wo = (normal - basis_around(normal).tangent).normalize();
-    (Surface { normal, eta: 1.0 }, wo)
+    let surface = Surface {
+        normal,
+        eta: 1.0,
+        offset: DVec3::ZERO,
+    };
+    (surface, wo)
 }
 
 fn by_its_own(kind: &MaterialKind) -> Ratios {

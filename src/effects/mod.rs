@@ -348,6 +348,12 @@ impl Effects {
         self.transmits() && self.forms().any(|(_, form)| form.relative)
     }
 
+    /// Whether a material looks at where on its sphere a point is.
+    #[must_use]
+    pub fn looks_at_offset(&self) -> bool {
+        self.forms().any(|(_, form)| form.offset)
+    }
+
     /// Whether lights are weighed at each vertex.
     #[must_use]
     pub fn weighs_lights(&self) -> bool {
@@ -381,6 +387,7 @@ impl Effects {
         effects.chain([
             ("transmits", self.transmits()),
             ("relative", self.looks_at_index()),
+            ("offset", self.looks_at_offset()),
             ("weighed", self.weighs_lights()),
             ("sampled", self.samples_light()),
             ("through", self.looks_through()),

@@ -18,7 +18,11 @@ const POINTS: u32 = 512;
 /// `axis` is that of the material.
 pub(super) fn most_scattered(material: &dyn Bsdf, axis: DVec3) -> DVec3 {
     let normal = basis_around(axis).tangent;
-    let surface = Surface { normal, eta: 1.0 };
+    let surface = Surface {
+        normal,
+        eta: 1.0,
+        offset: DVec3::ZERO,
+    };
     let across = axis.cross(normal);
     let mut most = DVec3::ZERO;
     // Close to each other at grazing angles.

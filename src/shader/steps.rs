@@ -34,7 +34,7 @@ pub struct Loop {
 }
 
 /// All loops of the path tracer's kernel.
-pub const LOOPS: [Loop; 8] = [
+pub const LOOPS: [Loop; 9] = [
     // Over vertices.
     Loop {
         function: "render",
@@ -82,6 +82,16 @@ pub const LOOPS: [Loop; 8] = [
             rays(effects) * (spheres.div_ceil(SPHERES_AN_ITERATION) + 1)
         },
     },
+    // Over the cells that may hold the flake of a point: at most three along each axis.
+    Loop {
+        function: "flake_at",
+        used: has_flakes,
+        at_vertex: |_, effects| {
+            // By `sample`, with the lecture's integrator by `share` and `evaluate`; and for a light.
+            let lecture = usize::from(effects.has(Effect::Lecture));
+            (rays(effects) + lecture) * (27 + 1)
+        },
+    },
     // Over the lights that are weighed.
     Loop {
         function: "weigh_lights",
@@ -89,6 +99,11 @@ pub const LOOPS: [Loop; 8] = [
         at_vertex: |placement, _| placement.lights.table.len().max(1) + 1,
     },
 ];
+
+fn has_flakes(effects: &Effects) -> bool {
+    let flaked = ["car_paint_flakes", "car_paint_coated_flakes"];
+    effects.forms().any(|(_, form)| flaked.contains(&form.name))
+}
 
 /// Rays that are traced at a vertex: with light sampling also one to a light.
 fn rays(effects: &Effects) -> usize {
