@@ -354,6 +354,12 @@ impl Effects {
         self.forms().any(|(_, form)| form.offset)
     }
 
+    /// Whether a paint has flakes.
+    #[must_use]
+    pub fn has_flakes(&self) -> bool {
+        self.forms().any(|(_, form)| flakes::are_in(form))
+    }
+
     /// Whether lights are weighed at each vertex.
     #[must_use]
     pub fn weighs_lights(&self) -> bool {
@@ -388,6 +394,7 @@ impl Effects {
             ("transmits", self.transmits()),
             ("relative", self.looks_at_index()),
             ("offset", self.looks_at_offset()),
+            ("flaked", self.has_flakes()),
             ("weighed", self.weighs_lights()),
             ("sampled", self.samples_light()),
             ("through", self.looks_through()),
