@@ -17,7 +17,7 @@ mod surfaces;
 use std::collections::BTreeSet;
 use std::sync::LazyLock;
 
-use crate::materials::{Form, forms};
+use crate::materials::{Form, flakes, forms};
 use crate::placement::{PlacedSphere, Placement};
 use crate::scene::{Material, Scene};
 use crate::settings::Settings;
