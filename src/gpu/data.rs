@@ -236,8 +236,7 @@ fn materials(kernel: &Kernel, scene: &Scene, placement: &Placement, effects: &Ef
         .map(|(member, (_, offset))| (member, offset))
         .collect();
     let shared = scene.materials.iter();
-    let shared =
-        shared.map(|m| MaterialRecord::new(m, placement.radiance_scale, placement.scale));
+    let shared = shared.map(|m| MaterialRecord::new(m, placement.radiance_scale, placement.scale));
     let anchored = anchored_spheres(scene, placement);
     let anchored =
         anchored.map(|i| MaterialRecord::of_sphere(&placement.spheres[i], scene, placement));

@@ -24,7 +24,9 @@ pub(super) const FLAKE_MEMBERS: [Member; 5] = [
 
 /// Whether a form has them.
 pub(crate) fn are_in(form: &Form) -> bool {
-    FLAKE_MEMBERS.iter().all(|member| form.members.contains(member))
+    FLAKE_MEMBERS
+        .iter()
+        .all(|member| form.members.contains(member))
 }
 
 /// And where poles are in their lattice.

@@ -149,7 +149,9 @@ impl Paint {
         if place < 0.0 {
             let pair = Pair::between(o, cosine_direction(DVec3::Z, plane));
             let third = turned(&pair, a, &self.frame, &third_frame);
-            return self.lobes(weights, &pair, &third).sample(&self.frame, &pair);
+            return self
+                .lobes(weights, &pair, &third)
+                .sample(&self.frame, &pair);
         }
         let mut chosen = 0;
         while chosen < 2 && place >= lobes[chosen] {
@@ -164,7 +166,8 @@ impl Paint {
             let pair = Pair::about(o, normal(o));
             (pair, turned(&pair, a, &self.frame, &third_frame))
         };
-        self.lobes(weights, &pair, &third).sample(&self.frame, &pair)
+        self.lobes(weights, &pair, &third)
+            .sample(&self.frame, &pair)
     }
 
     /// The share of the light that it reflects, at most, by channel: facets reflect all of it at most.

@@ -178,7 +178,9 @@ impl CarPaint {
     /// All of it at a point.
     fn paint_at(&self, surface: &Surface) -> Paint {
         let paint = self.paint(surface.normal);
-        let flake = self.flakes.and_then(|flakes| Some((flakes, flakes.normal_at(surface)?)));
+        let flake = self
+            .flakes
+            .and_then(|flakes| Some((flakes, flakes.normal_at(surface)?)));
         flake.map_or(paint, |(flakes, normal)| flaked(&paint, &flakes, normal))
     }
 
@@ -221,8 +223,14 @@ impl Bsdf for CarPaint {
             return None;
         }
         let needed = [
-            (self.diffuse.is_some(), "a car paint without `preset` needs `diffuse`"),
-            (self.specular.is_some(), "a car paint without `preset` needs `specular`"),
+            (
+                self.diffuse.is_some(),
+                "a car paint without `preset` needs `diffuse`",
+            ),
+            (
+                self.specular.is_some(),
+                "a car paint without `preset` needs `specular`",
+            ),
             (self.f0.is_some(), "a car paint without `preset` needs `f0`"),
             (self.m.is_some(), "a car paint without `preset` needs `m`"),
         ];
@@ -278,7 +286,9 @@ impl Bsdf for CarPaint {
     // 1 + t (max(d) - min(d))/F: that is linear in F. The mean of both is at most the larger.
     fn moment(&self, channel: usize, k: i32) -> f64 {
         let paint = self.paint(DVec3::Z);
-        let flakes = self.flakes.is_some_and(|flakes| flakes.color[channel] > 0.0);
+        let flakes = self
+            .flakes
+            .is_some_and(|flakes| flakes.color[channel] > 0.0);
         let glossy = flakes || paint.lobes.iter().any(|lobe| lobe.color[channel] > 0.0);
         let diffuse = paint.diffuse[channel];
         match (glossy, k, self.clearcoat) {
@@ -292,7 +302,9 @@ impl Bsdf for CarPaint {
                     diffuse => diffuse * f64::max(1.0 / most, 2.0 - least / most),
                 };
                 let lobes = paint.lobes.iter().map(|lobe| lobe.color.max_element());
-                let flake = self.flakes.map_or(0.0, |flakes| 4.0 * flakes.color.max_element());
+                let flake = self
+                    .flakes
+                    .map_or(0.0, |flakes| 4.0 * flakes.color.max_element());
                 let coat = f64::max(1.0, most + lobes.sum::<f64>() + flake);
                 f64::max(coat.powi(k), cosine_moment(k) * over.powi(k))
             }
