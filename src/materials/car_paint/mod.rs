@@ -107,11 +107,11 @@ const BLACK: Base = Base {
     m: DVec3::ONE,
 };
 
-/// The paint on a flake of this normal.
+/// The paint on a flake of this normal in the surface's frame.
 fn flaked(paint: &Paint, flakes: &Flakes, normal: DVec3) -> Paint {
     let mut paint = *paint;
     paint.lobes[2].color = 4.0 * flakes.color;
-    paint.third_frame = Some(Frame::around(normal));
+    paint.third_frame = Frame::around(normal);
     paint
 }
 
@@ -163,7 +163,7 @@ impl CarPaint {
         } = self.base();
         Paint {
             frame: Frame::around(normal),
-            third_frame: None,
+            third_frame: Frame::around(DVec3::Z),
             diffuse,
             lobes: [0, 1, 2].map(|k| Lobe {
                 color: 4.0 * if k == 2 { self.third() } else { specular[k] },
@@ -180,7 +180,7 @@ impl CarPaint {
         let paint = self.paint(surface.normal);
         let flake = self
             .flakes
-            .and_then(|flakes| Some((flakes, flakes.normal_at(surface)?)));
+            .and_then(|flakes| Some((flakes, flakes.normal_within(surface, &paint.frame)?)));
         flake.map_or(paint, |(flakes, normal)| flaked(&paint, &flakes, normal))
     }
 
@@ -268,7 +268,7 @@ impl Bsdf for CarPaint {
     fn albedo(&self) -> DVec3 {
         let paint = self.paint(DVec3::Z);
         let flake = self.flakes.map_or(DVec3::ZERO, |flakes| {
-            let lobe = flaked(&paint, &flakes, paint.frame.normal());
+            let lobe = flaked(&paint, &flakes, DVec3::Z);
             let third = lobe.lobes[2];
             lobe.albedo() + (4.0 * (1.0 + third.m * third.m).sqrt() - 1.0) * third.color
         });
