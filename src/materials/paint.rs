@@ -161,7 +161,8 @@ impl Paint {
             };
             (pair, within(&pair, turned))
         };
-        self.lobes(weights, &pair, &third).sample(&self.frame, &pair)
+        self.lobes(weights, &pair, &third)
+            .sample(&self.frame, &pair)
     }
 
     /// The share of the light that it reflects, at most, by channel: facets reflect all of it at most.
