@@ -427,6 +427,15 @@ fn mistakes_are_told_with_their_place() {
         ("diffuse = [0, 0, 0]".to_owned(), "needs `specular`"),
         ("preset = \"polaris-gold\"".into(), "polaris-silber"),
         (format!("{silver}\nm = [0.1, 0.1, 0.0]"), "0.001"),
+        (format!("{silver}\nm = [0.1, -0.1, 0.1]"), "negative"),
+        (format!("{silver}\nclearcoat = 1.5"), "must be a table"),
+        (
+            format!(
+                "{silver}\nflakes = {{ density = 1, scale = 1e19, spread = 0, jitter = 0, color = [0, 0, 0] }}"
+            ),
+            "`scale`",
+        ),
+        (format!("{silver}\nclearcoats = {{ ior = 1.5 }}"), "`clearcoat`?"),
         (
             format!("{silver}\nspecular = [[0, 0, 0]]"),
             "exactly 3 rows",

@@ -7,12 +7,15 @@ use serde::Deserialize;
 use super::beckmann::beckmann_slope2;
 use super::ggx::Frame;
 use super::lattice::{LatticePoint, anchor_members};
-use super::schema::{self, MAX_MAGNITUDE};
+use super::schema;
 use super::{Form, Member, MemberValue, Surface, Value};
 use crate::reference::core::random::{mix_bits, unit_float};
 use crate::reference::core::sampling::circle_point;
 
 const FLAKE_KEY: u32 = 0x464c_414b;
+
+/// The most cells a scene unit: offsets in cells are numbers of f32.
+const MAX_SCALE: f64 = 1.0e18;
 
 /// What flakes add to a form.
 pub(super) const FLAKE_MEMBERS: [Member; 5] = [
@@ -44,7 +47,7 @@ pub struct Flakes {
     #[schemars(range(min = 0.0, max = 1.0))]
     pub density: f64,
     /// Cells a scene unit; flakes are as large as a cell.
-    #[schemars(range(max = MAX_MAGNITUDE), extend("exclusiveMinimum" = 0.0))]
+    #[schemars(range(max = MAX_SCALE), extend("exclusiveMinimum" = 0.0))]
     pub scale: f64,
     /// Root mean square slope of flakes against the surface.
     #[schemars(range(min = 0.0, max = 1.0))]
