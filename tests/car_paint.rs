@@ -435,7 +435,10 @@ fn mistakes_are_told_with_their_place() {
             ),
             "`scale`",
         ),
-        (format!("{silver}\nclearcoats = {{ ior = 1.5 }}"), "`clearcoat`?"),
+        (
+            format!("{silver}\nclearcoats = {{ ior = 1.5 }}"),
+            "`clearcoat`?",
+        ),
         (
             format!("{silver}\nspecular = [[0, 0, 0]]"),
             "exactly 3 rows",
