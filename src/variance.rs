@@ -212,11 +212,15 @@ impl Cycle {
         } else {
             "no --termination is low enough: use --integrator bsdf".into()
         };
+        let growth = if self.factor.is_finite() {
+            format!("by a factor of up to {:.3}", self.factor)
+        } else {
+            "without bound".into()
+        };
         format!(
             "{says}: with --integrator lecture and a probability of termination of {termination}, \
-             the mean {square} of a path's weight grows by a factor of up to {:.3} at every event \
+             the mean {square} of a path's weight grows {growth} at every event \
              between surfaces of {between}; {lower}",
-            self.factor,
         )
     }
 }

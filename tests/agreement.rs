@@ -141,6 +141,7 @@ fn perturbed(scene: &Scene, factor: f64) -> Scene {
             MaterialKind::Disney(m) => m.base_color *= factor,
             MaterialKind::Sheen(m) => m.color *= factor,
             MaterialKind::Nylon(m) => m.diffuse *= factor,
+            MaterialKind::CarPaint(m) => m.diffuse = m.diffuse.map(|kd| factor * kd),
         }
     }
     scene

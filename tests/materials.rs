@@ -158,6 +158,7 @@ fn the_kernel_knows_delta_lobes() {
         let surface = gpu_trace::materials::Surface {
             normal: glam::DVec3::Z,
             eta: 1.0,
+            offset: glam::DVec3::ZERO,
         };
         let input = gpu_trace::gpu::bsdf_probe::BsdfInput::new(
             subject,

@@ -36,6 +36,7 @@ fn drawn(m: &Reflective, integrator: Integrator, degrees: f64) -> Vec<Sampled> {
     let surface = Surface {
         normal: DVec3::Z,
         eta: 1.0,
+        offset: DVec3::ZERO,
     };
     let mut random = Random::new(&format!("{m:?} {degrees}"));
     let inputs: Vec<BsdfInput> = (0..SAMPLES)

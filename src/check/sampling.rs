@@ -109,7 +109,12 @@ fn mirror(context: &Context, measure: &mut Measure) -> Result<()> {
         .map(|_| {
             let (normal, wo) = (random.direction(), random.direction());
             let wo = if wo.dot(normal) < 0.0 { -wo } else { wo };
-            BsdfInput::new(0, &Surface { normal, eta: 1.0 }, wo, random.unit4())
+            let surface = Surface {
+                normal,
+                eta: 1.0,
+                offset: DVec3::ZERO,
+            };
+            BsdfInput::new(0, &surface, wo, random.unit4())
         })
         .collect();
     let silver = MaterialKind::from(Mirror {

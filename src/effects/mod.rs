@@ -17,7 +17,7 @@ mod surfaces;
 use std::collections::BTreeSet;
 use std::sync::LazyLock;
 
-use crate::materials::{Form, forms};
+use crate::materials::{Form, flakes, forms};
 use crate::placement::{PlacedSphere, Placement};
 use crate::scene::{Material, Scene};
 use crate::settings::Settings;
@@ -368,6 +368,18 @@ impl Effects {
         self.transmits() && self.forms().any(|(_, form)| form.relative)
     }
 
+    /// Whether a material looks at where on its sphere a point is.
+    #[must_use]
+    pub fn looks_at_offset(&self) -> bool {
+        self.forms().any(|(_, form)| form.offset)
+    }
+
+    /// Whether a paint has flakes.
+    #[must_use]
+    pub fn has_flakes(&self) -> bool {
+        self.forms().any(|(_, form)| flakes::are_in(form))
+    }
+
     /// Whether lights are weighed at each vertex.
     #[must_use]
     pub fn weighs_lights(&self) -> bool {
@@ -401,6 +413,8 @@ impl Effects {
         effects.chain([
             ("transmits", self.transmits()),
             ("relative", self.looks_at_index()),
+            ("offset", self.looks_at_offset()),
+            ("flaked", self.has_flakes()),
             ("weighed", self.weighs_lights()),
             ("sampled", self.samples_light()),
             ("through", self.looks_through()),

@@ -26,6 +26,10 @@ pub struct BsdfInput {
     pub eta: f32,
     /// Uniform numbers for `sample`, a direction for `evaluate`.
     pub u: [f32; 4],
+    /// See [`Surface::offset`].
+    pub offset: [f32; 3],
+    /// Padding.
+    pub unused: u32,
 }
 
 impl BsdfInput {
@@ -38,6 +42,8 @@ impl BsdfInput {
             normal: surface.normal.as_vec3().to_array(),
             eta: surface.eta as f32,
             u,
+            offset: surface.offset.as_vec3().to_array(),
+            unused: 0,
         }
     }
 
@@ -47,6 +53,7 @@ impl BsdfInput {
         Surface {
             normal: DVec3::from(self.normal.map(f64::from)),
             eta: f64::from(self.eta),
+            offset: DVec3::from(self.offset.map(f64::from)),
         }
     }
 

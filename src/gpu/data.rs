@@ -8,7 +8,8 @@ use crate::effects::{Effect, Effects};
 use crate::error::{Error, Result};
 use crate::gpu::engine::{Pass, Recording};
 use crate::gpu::layout::{
-    LightRecord, MaterialRecord, PoleRecord, SKY_TABLE_WIDTH, SphereRecord, light_weight, sky_table,
+    LightRecord, MaterialRecord, PoleRecord, SKY_TABLE_WIDTH, SphereRecord, anchored_spheres,
+    light_weight, sky_table,
 };
 use crate::image::Picture;
 use crate::materials::Member;
@@ -172,7 +173,7 @@ fn scene_data(
         let array = match name.as_str() {
             "spheres" => spheres(placement),
             "poles" => poles(placement),
-            "attributes" => attributes(placement, effects),
+            "attributes" => attributes(scene, placement, effects),
             "materials" => materials(kernel, scene, placement, effects),
             "lights" => lights(kernel, placement, effects),
             other => unreachable!("no scene data {other}"),
@@ -197,10 +198,14 @@ fn poles(placement: &Placement) -> Vec<u8> {
     bytes_of(poles.filter_map(|s| Some(PoleRecord::new(s, s.pole?))))
 }
 
-fn attributes(placement: &Placement, effects: &Effects) -> Vec<u8> {
+fn attributes(scene: &Scene, placement: &Placement, effects: &Effects) -> Vec<u8> {
     let mut words: Vec<u32> = Vec::new();
+    let mut anchored = anchored_spheres(scene, placement)
+        .zip(scene.materials.len()..)
+        .peekable();
     for (index, sphere) in placement.spheres.iter().enumerate() {
-        words.push(sphere.material as u32);
+        let own = anchored.next_if(|(i, _)| *i == index);
+        words.push(own.map_or(sphere.material, |(_, record)| record) as u32);
         if effects.has(Effect::Interior) {
             words.push(sphere.side as u32);
         }
@@ -230,10 +235,14 @@ fn materials(kernel: &Kernel, scene: &Scene, placement: &Placement, effects: &Ef
     let members: Vec<(Member, u32)> = std::iter::zip(material_members(effects), offsets)
         .map(|(member, (_, offset))| (member, offset))
         .collect();
-    let record = |m| MaterialRecord::new(m, placement.radiance_scale, placement.scale);
-    let materials = scene.materials.iter();
-    materials
-        .flat_map(|m| record(m).bytes(&members, size))
+    let shared = scene.materials.iter();
+    let shared = shared.map(|m| MaterialRecord::new(m, placement.radiance_scale, placement.scale));
+    let anchored = anchored_spheres(scene, placement);
+    let anchored =
+        anchored.map(|i| MaterialRecord::of_sphere(&placement.spheres[i], scene, placement));
+    let records = shared.chain(anchored);
+    records
+        .flat_map(|record| record.bytes(&members, size))
         .collect()
 }
 

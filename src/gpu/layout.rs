@@ -13,7 +13,7 @@ use crate::materials::dielectric::Index;
 use crate::materials::{Member, MemberValue, forms};
 use crate::placement::sky::{Band, Entry};
 use crate::placement::{Light, PlacedCamera, PlacedSphere, Placement, SkyTable};
-use crate::scene::Material;
+use crate::scene::{Material, Scene};
 use crate::settings::Rect;
 
 /// `Sphere` of `shaders/scene/list.wesl`: a sphere about its centre.
@@ -305,6 +305,16 @@ fn dispersion(material: &Material) -> [(Member, MemberValue); 3] {
     ]
 }
 
+/// The spheres about their poles whose materials look at the offset: each has a record of its material for itself,
+/// after those of the scene's materials.
+pub fn anchored_spheres<'a>(
+    scene: &'a Scene,
+    placement: &'a Placement,
+) -> impl Iterator<Item = usize> + 'a {
+    let form = |i: &usize| scene.materials[placement.spheres[*i].material].kind.form();
+    (0..placement.poles).filter(move |i| !form(i).anchored.is_empty())
+}
+
 /// What a kernel may want to know of a material, rounded to f32.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MaterialRecord {
@@ -338,6 +348,21 @@ impl MaterialRecord {
         Self {
             values: common.chain(own).collect(),
         }
+    }
+
+    /// That of a sphere's material, with what depends on where its pole is.
+    #[must_use]
+    pub fn of_sphere(sphere: &PlacedSphere, scene: &Scene, placement: &Placement) -> Self {
+        let material = &scene.materials[sphere.material];
+        let mut record = Self::new(material, placement.radiance_scale, placement.scale);
+        if sphere.pole.is_some() {
+            let members = material.kind.form().anchored.iter().copied();
+            let values = material
+                .kind
+                .anchored(sphere.anchor_offset(placement.scale));
+            record.values.extend(members.zip(values));
+        }
+        record
     }
 
     /// The value of a member; of one that the material does not have, 0, or 1 for a refractive index.

@@ -12,6 +12,8 @@ pub struct Surface {
     /// Refractive index beyond the surface over that before it, for materials that transmit; for others one
     /// over the index before it.
     pub eta: f64,
+    /// From the sphere's centre, in scene units. In the kernel from the sphere's anchor.
+    pub offset: DVec3,
 }
 
 /// The direction in which a path goes on.

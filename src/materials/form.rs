@@ -13,12 +13,20 @@ pub struct Form {
     pub what: &'static str,
     /// Whether it scatters light in delta lobes alone.
     pub delta: bool,
+    /// Whether it has a delta lobe beside others: `sample` takes it where u.z is below its probability, and the
+    /// kernel has that as `share_NAME(surface, wo)`.
+    pub part_delta: bool,
     /// Whether paths cross the surface.
     pub transmits: bool,
     /// Of one that does not: whether it looks at the index before the surface.
     pub relative: bool,
+    /// Whether it looks at where on the sphere the point is: `Surface::offset`, which no other kernel has.
+    pub offset: bool,
     /// Members of the kernel's `Material` that it reads, besides those that all have.
     pub members: &'static [Member],
+    /// Of one that looks at the offset: members that depend on where the pole of a sphere is that is about its pole.
+    /// Such a sphere has a record of the material for itself; without pole frames no kernel has them.
+    pub anchored: &'static [Member],
 }
 
 impl Form {
@@ -30,9 +38,12 @@ impl Form {
             material,
             what: "",
             delta: false,
+            part_delta: false,
             transmits: false,
             relative: false,
+            offset: false,
             members: &[],
+            anchored: &[],
         }
     }
 

@@ -9,6 +9,7 @@ use crate::verify::{Cells, Random};
 pub(super) const SURFACE: Surface = Surface {
     normal: DVec3::Z,
     eta: 1.0,
+    offset: DVec3::ZERO,
 };
 
 /// The direction that makes `degrees` with the normal, turned by `turn` radians about it.

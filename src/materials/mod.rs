@@ -5,12 +5,17 @@
 //! the functions of its forms. Schema, validation, hash, kernel members, kind codes, both dispatches, the
 //! rows of the effects and the tests that every material has to pass follow from the line.
 
+pub mod beckmann;
+pub mod coat;
 mod contract;
+pub mod flakes;
 mod form;
 pub mod ggx;
 #[cfg(test)]
 mod hemisphere;
+pub mod lattice;
 pub mod lobes;
+mod paint;
 pub mod powers;
 mod scattered;
 pub mod schema;
@@ -41,6 +46,12 @@ pub trait Bsdf {
     /// The values of its form's members.
     fn members(&self) -> Vec<MemberValue>;
 
+    /// The values of its form's anchored members, for a sphere whose pole is at `anchor` from its centre, in scene
+    /// units.
+    fn anchored(&self, _: DVec3) -> Vec<MemberValue> {
+        Vec::new()
+    }
+
     /// Its colour, for the layer `albedo`: about the share of the light that it scatters.
     fn color(&self) -> DVec3;
 
@@ -48,11 +59,17 @@ pub trait Bsdf {
     fn albedo(&self) -> DVec3;
 
     /// The k-th moment of the weight of a direction drawn uniformly from the hemisphere, or of a delta
-    /// lobe's, in a channel, at most: what the lecture's variance law needs.
+    /// lobe's, or of both where there are both ([`sample_uniform`]), in a channel, at most: what the lecture's
+    /// variance law needs. Infinite if there is no bound.
     fn moment(&self, channel: usize, k: i32) -> f64;
 
     /// Chooses where a path goes on, from uniform numbers.
     fn sample(&self, surface: &Surface, wo: DVec3, u: [f64; 4]) -> BsdfSample;
+
+    /// The probability of its delta lobe beside others: `sample` chooses it where u[2] is below.
+    fn delta_share(&self, _: &Surface, _: DVec3) -> f64 {
+        0.0
+    }
 
     /// f cos of `wi` and the pdf with which [`sample`](Self::sample) finds it, without delta lobes.
     fn evaluate(&self, surface: &Surface, wo: DVec3, wi: DVec3) -> BsdfValue;
@@ -95,7 +112,7 @@ pub struct Mistake {
 }
 
 /// The value of a parameter.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Value {
     /// A number.
     Number(f64),
@@ -103,13 +120,10 @@ pub enum Value {
     Vector(DVec3),
     /// Two numbers.
     Pair(DVec2),
-    /// Sellmeier's terms.
-    Terms {
-        /// Strengths.
-        b: DVec3,
-        /// Squares of wavelengths.
-        c: DVec3,
-    },
+    /// Several colours or vectors.
+    Vectors(Vec<DVec3>),
+    /// An inline table.
+    Table(Vec<(&'static str, Value)>),
 }
 
 /// A type of materials.
@@ -207,6 +221,7 @@ materials! {
     disney::Disney,
     sheen::Sheen,
     nylon::Nylon,
+    car_paint::CarPaint,
 }
 
 impl MaterialKind {
@@ -233,6 +248,12 @@ impl MaterialKind {
     #[must_use]
     pub fn is_translucent(&self) -> bool {
         self.form().is_translucent()
+    }
+
+    /// Whether it has a delta lobe beside others.
+    #[must_use]
+    pub fn is_part_delta(&self) -> bool {
+        self.form().part_delta
     }
 }
 

@@ -7,7 +7,8 @@ use glam::{DVec2, DVec3};
 use super::{Bsdf, BsdfSample, Surface};
 use crate::reference::core::sampling::sphere_direction;
 
-/// The lecture's way to sample any material but delta lobes: uniform on the hemisphere, pdf = 1/(2 pi).
+/// The lecture's way to sample any material but delta lobes: uniform on the hemisphere, pdf = 1/(2 pi). A delta
+/// lobe beside others is chosen as the material itself does.
 #[must_use]
 pub fn sample_uniform(
     material: &dyn Bsdf,
@@ -15,13 +16,17 @@ pub fn sample_uniform(
     wo: DVec3,
     u: [f64; 4],
 ) -> BsdfSample {
+    let share = material.delta_share(surface, wo);
+    if u[2] < share {
+        return material.sample(surface, wo, u);
+    }
     let w = sphere_direction(DVec2::new(u[0], u[1]));
     let wi = if w.dot(surface.normal) < 0.0 { -w } else { w };
     let value = material.evaluate(surface, wo, wi);
     BsdfSample {
         wi,
-        weight: TAU * value.f_cos,
-        pdf: 1.0 / TAU,
+        weight: TAU * value.f_cos / (1.0 - share),
+        pdf: (1.0 - share) / TAU,
         event: value.event,
         eta: 1.0,
     }

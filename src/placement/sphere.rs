@@ -32,6 +32,15 @@ pub struct PlacedSphere {
     pub cores: Vec<usize>,
 }
 
+impl PlacedSphere {
+    /// Where the anchor is, from the centre and in scene units; `scale`: the placement's.
+    #[must_use]
+    pub fn anchor_offset(&self, scale: f64) -> DVec3 {
+        self.pole
+            .map_or(DVec3::ZERO, |normal| self.radius / scale * normal)
+    }
+}
+
 /// Which side of a sphere's surface paths can be on.
 ///
 /// No path crosses an opaque surface, so its side is that of the camera, once and for all; and a

@@ -171,6 +171,8 @@ impl PathTracer<'_> {
             } else {
                 1.0 / index_within(media)
             },
+            offset: sphere.anchor_offset(self.placement.scale)
+                + vertex.offset / self.placement.scale,
         };
         let wo = -path.ray.direction;
         if self.samples_lamps() || self.sky().is_some() {

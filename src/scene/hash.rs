@@ -126,16 +126,24 @@ impl Fnv {
     fn kind(&mut self, kind: &MaterialKind) {
         self.bytes(kind.name().as_bytes());
         for (_, value) in kind.parameters() {
-            match value {
-                Value::Number(number) => self.number(number),
-                Value::Vector(vector) => self.vector(vector),
-                Value::Pair(pair) => {
-                    self.number(pair.x);
-                    self.number(pair.y);
-                }
-                Value::Terms { b, c } => {
-                    self.vector(b);
-                    self.vector(c);
+            self.value(value);
+        }
+    }
+
+    fn value(&mut self, value: Value) {
+        match value {
+            Value::Number(number) => self.number(number),
+            Value::Vector(vector) => self.vector(vector),
+            Value::Pair(pair) => {
+                self.number(pair.x);
+                self.number(pair.y);
+            }
+            Value::Vectors(vectors) => vectors.into_iter().for_each(|v| self.vector(v)),
+            // Tables may be left out: their keys say which there are.
+            Value::Table(values) => {
+                for (key, value) in values {
+                    self.bytes(key.as_bytes());
+                    self.value(value);
                 }
             }
         }
@@ -156,11 +164,13 @@ mod tests {
         material.matte = { type = "diffuse", albedo = [0.1, 0.2, 0.3] }
         material.shiny = { type = "reflective", albedo = [0.1, 0.2, 0.3], specular = [1, 1, 1], epsilon = 0.01, mu = 9 }
         material.chrome = { type = "mirror", reflectance = [0.1, 0.2, 0.3] }
+        material.sprayed = { type = "car-paint", preset = "polaris-silber", m = [0.3, 0.2, 0.1], clearcoat = { ior = 1.5 } }
         sphere = [
             { center = [0, 0, 0], radius = 1, material = "glass", priority = 0 },
             { center = [3, 0, 0], radius = 1, material = "matte" },
             { center = [6, 0, 0], radius = 1, material = "shiny" },
             { center = [9, 0, 0], radius = 1, material = "chrome" },
+            { center = [12, 0, 0], radius = 1, material = "sprayed" },
         ]
     "#;
 
@@ -187,6 +197,7 @@ mod tests {
             MaterialKind::Disney(m) => m.clearcoat += 0.1,
             MaterialKind::Sheen(m) => m.roughness += 0.1,
             MaterialKind::Nylon(m) => m.a.y += 0.1,
+            MaterialKind::CarPaint(m) => m.m = None,
         };
         let gradient = |zenith| {
             let [horizon, ground] = [DVec3::ZERO; 2];
@@ -225,7 +236,7 @@ mod tests {
             changed.push(scene);
         }
         hashes.extend(changed.iter().map(content_hash));
-        for index in 0..4 {
+        for index in 0..5 {
             let mut scene = scene();
             change(&mut scene.materials[index].kind);
             hashes.push(content_hash(&scene));
@@ -244,7 +255,7 @@ mod tests {
         other.camera.position.x = -0.0;
         other.materials.reverse();
         for sphere in &mut other.spheres {
-            sphere.material = 3 - sphere.material;
+            sphere.material = 4 - sphere.material;
         }
         other.materials[0].name = "other".to_owned();
         other.materials.push(other.materials[0].clone());

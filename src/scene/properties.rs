@@ -15,9 +15,29 @@ use crate::error::Error;
 use crate::materials::schema::MAX_MAGNITUDE;
 use crate::materials::{ALL, MaterialKind, Value};
 
+fn vector(v: DVec3) -> String {
+    format!("[{:?}, {:?}, {:?}]", v.x, v.y, v.z)
+}
+
+fn value_text(value: Value) -> String {
+    match value {
+        Value::Number(number) => format!("{number:?}"),
+        Value::Vector(v) => vector(v),
+        Value::Pair(pair) => format!("[{:?}, {:?}]", pair.x, pair.y),
+        Value::Vectors(all) => {
+            let all: Vec<String> = all.into_iter().map(vector).collect();
+            format!("[{}]", all.join(", "))
+        }
+        Value::Table(values) => {
+            let pairs = values.into_iter();
+            let pairs = pairs.map(|(key, value)| format!("{key} = {}", value_text(value)));
+            format!("{{ {} }}", pairs.collect::<Vec<_>>().join(", "))
+        }
+    }
+}
+
 /// The scene as a scene file. `{:?}` writes the shortest decimal that reads back as the same f64.
 fn to_toml(scene: &Scene) -> String {
-    let vector = |v: DVec3| format!("[{:?}, {:?}, {:?}]", v.x, v.y, v.z);
     let camera = &scene.camera;
     let mut text = format!(
         "[camera]\nposition = {}\nlook_at = {}\nup = {}\nfov = {:?}\nhandedness = {:?}\n\
@@ -63,14 +83,7 @@ fn to_toml(scene: &Scene) -> String {
             vector(material.emission)
         ));
         for (key, value) in material.kind.parameters() {
-            add(match value {
-                Value::Number(number) => format!("{key} = {number:?}"),
-                Value::Vector(v) => format!("{key} = {}", vector(v)),
-                Value::Pair(pair) => format!("{key} = [{:?}, {:?}]", pair.x, pair.y),
-                Value::Terms { b, c } => {
-                    format!("{key} = {{ b = {}, c = {} }}", vector(b), vector(c))
-                }
-            });
+            add(format!("{key} = {}", value_text(value)));
         }
     }
     for sphere in &scene.spheres {

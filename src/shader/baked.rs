@@ -196,10 +196,7 @@ fn material_of(text: &mut String, scene: &Scene, placement: &Placement, effects:
     let records: Vec<MaterialRecord> = placement
         .spheres
         .iter()
-        .map(|s| {
-            let material = &scene.materials[s.material];
-            MaterialRecord::new(material, placement.radiance_scale, placement.scale)
-        })
+        .map(|s| MaterialRecord::of_sphere(s, scene, placement))
         .collect();
     *text += "fn material_of(index: u32) -> Material {\nvar material: Material;\n";
     for member in members(effects) {

@@ -26,7 +26,11 @@ pub fn members(effects: &Effects) -> Vec<Member> {
         own.push(Member::scalar("cauchy"));
     }
     for (_, form) in effects.forms() {
-        for member in form.members {
+        let anchored = match effects.has(Effect::Pole) {
+            true => form.anchored,
+            false => &[],
+        };
+        for member in form.members.iter().chain(anchored) {
             if !own.contains(member) {
                 own.push(*member);
             }
@@ -50,15 +54,26 @@ pub(super) fn module(effects: &Effects) -> String {
     let mut text =
         String::from("import package::materials::contract::{Surface, BsdfSample, BsdfValue};\n");
     let lecture = effects.has(Effect::Lecture);
-    let uniform = |form: &Form| lecture && form.is_hemispherical();
-    if forms.iter().any(|(_, form)| uniform(form)) {
-        text += "import package::materials::uniform::sample_uniform;\n";
+    for (name, drawn) in [
+        ("sample_uniform", Drawn::Uniform),
+        ("sample_beside", Drawn::Beside),
+    ] {
+        if forms
+            .iter()
+            .any(|(_, form)| Drawn::of(form, lecture) == drawn)
+        {
+            let _ = writeln!(text, "import package::materials::uniform::{name};");
+        }
     }
     for (_, form) in &forms {
         let (name, module) = (form.name, form.material.replace('-', "_"));
         // Writing to a String cannot fail.
-        if !uniform(form) {
+        let drawn = Drawn::of(form, lecture);
+        if drawn != Drawn::Uniform {
             let _ = writeln!(text, "import package::materials::{module}::sample_{name};");
+        }
+        if drawn == Drawn::Beside {
+            let _ = writeln!(text, "import package::materials::{module}::share_{name};");
         }
         if !form.delta {
             let _ = writeln!(
@@ -77,15 +92,9 @@ pub(super) fn module(effects: &Effects) -> String {
         let _ = writeln!(text, "{}: {ty},", member.name);
     }
     text += "}\n";
-    let sampled: Vec<(u32, String)> = forms
+    let samples: Vec<(u32, String)> = forms
         .iter()
-        .map(|(code, form)| match uniform(form) {
-            false => (
-                *code,
-                format!("return sample_{}(surface, wo, u);", form.name),
-            ),
-            true => (*code, "return sample_uniform(surface, wo, u);".into()),
-        })
+        .map(|(code, form)| (*code, sampled(form, lecture)))
         .collect();
     let evaluated: Vec<(u32, String)> = forms
         .iter()
@@ -100,7 +109,7 @@ pub(super) fn module(effects: &Effects) -> String {
     text += "fn sample(surface: Surface, wo: vec3f, u: vec4f) -> BsdfSample {\n";
     text += &dispatch(
         "surface.material",
-        sampled,
+        samples,
         "return BsdfSample(surface.normal, vec3f(0.0), 0.0, 0u, 1.0);",
     );
     text += "}\nfn evaluate(surface: Surface, wo: vec3f, wi: vec3f) -> BsdfValue {\n";
@@ -114,6 +123,41 @@ pub(super) fn module(effects: &Effects) -> String {
     text += &predicate("transmits", &forms, |form| form.transmits);
     text += &predicate("is_translucent", &forms, Form::is_translucent);
     text
+}
+
+/// How directions are drawn from a form.
+#[derive(Clone, Copy, PartialEq)]
+enum Drawn {
+    /// By its own `sample`.
+    Own,
+    /// Uniformly from the hemisphere, for the lecture.
+    Uniform,
+    /// So where its delta lobe, which it draws itself, is not chosen.
+    Beside,
+}
+
+impl Drawn {
+    fn of(form: &Form, lecture: bool) -> Self {
+        match lecture && form.is_hemispherical() {
+            false => Self::Own,
+            true if form.part_delta => Self::Beside,
+            true => Self::Uniform,
+        }
+    }
+}
+
+/// What `sample` does for a form.
+fn sampled(form: &Form, lecture: bool) -> String {
+    let name = form.name;
+    let own = format!("return sample_{name}(surface, wo, u);");
+    match Drawn::of(form, lecture) {
+        Drawn::Own => own,
+        Drawn::Uniform => "return sample_uniform(surface, wo, u);".into(),
+        Drawn::Beside => format!(
+            "let share = share_{name}(surface, wo);\nif u.z < share {{ {own} }}\n\
+             return sample_beside(surface, wo, u, share);"
+        ),
+    }
 }
 
 /// A function that says whether a material's form is such a one.

@@ -19,7 +19,7 @@ use wesl::{CompileOptions, ManglerKind, ModulePath, VirtualResolver, Wesl};
 use crate::bvh;
 use crate::effects::{Effect, Effects, Role};
 use crate::error::{Error, Result};
-use crate::gpu::layout::SKY_TABLE_WIDTH;
+use crate::gpu::layout::{SKY_TABLE_WIDTH, anchored_spheres};
 use crate::materials;
 use crate::placement::{Medium, Placement};
 use crate::scene::{Environment, Scene};
@@ -237,7 +237,8 @@ fn config(scene: &Scene, placement: &Placement, effects: &Effects) -> String {
     let mut text = String::new();
     if effects.keeps_spheres() {
         text += &format!("const SPHERE_COUNT: u32 = {}u;\n", placement.spheres.len());
-        text += &format!("const MATERIAL_COUNT: u32 = {}u;\n", scene.materials.len());
+        let records = scene.materials.len() + anchored_spheres(scene, placement).count();
+        text += &format!("const MATERIAL_COUNT: u32 = {records}u;\n");
         if effects.has(Effect::Pole) {
             text += &format!("const POLE_COUNT: u32 = {}u;\n", placement.poles);
         }
@@ -257,6 +258,10 @@ fn config(scene: &Scene, placement: &Placement, effects: &Effects) -> String {
         "const RAY_STEPS: u32 = {}u;\n",
         steps::vertex_steps(placement, effects)
     );
+    if effects.looks_at_offset() {
+        let unit = baked::number(1.0 / placement.scale);
+        text += &format!("const SCENE_UNIT: f32 = {unit};\n");
+    }
     text += &environment(scene, placement, effects);
     if effects.has(Effect::Lights) {
         let count = placement.lights.table.len().max(1);

@@ -34,7 +34,7 @@ pub struct Loop {
 }
 
 /// All loops of the path tracer's kernel.
-pub const LOOPS: [Loop; 8] = [
+pub const LOOPS: [Loop; 9] = [
     // Over vertices.
     Loop {
         function: "render",
@@ -80,6 +80,16 @@ pub const LOOPS: [Loop; 8] = [
         at_vertex: |placement, effects| {
             let spheres = placement.spheres.len() - placement.poles;
             rays(effects) * (spheres.div_ceil(SPHERES_AN_ITERATION) + 1)
+        },
+    },
+    // Over the cells that may hold the flake of a point: at most three along each axis.
+    Loop {
+        function: "flake_at",
+        used: Effects::has_flakes,
+        at_vertex: |_, effects| {
+            // By `sample`, with the lecture's integrator by `share` and `evaluate`; and for a light.
+            let lecture = usize::from(effects.has(Effect::Lecture));
+            (rays(effects) + lecture) * (27 + 1)
         },
     },
     // Over the lights that are weighed.

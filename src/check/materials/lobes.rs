@@ -92,7 +92,11 @@ fn weights(context: &Context, measure: &mut Measure) -> Result<()> {
                 0.0
             };
             let wo = (wo - lift * normal).normalize();
-            let surface = Surface { normal, eta: 1.0 };
+            let surface = Surface {
+                normal,
+                eta: 1.0,
+                offset: DVec3::ZERO,
+            };
             BsdfInput::new(i % lobes.len(), &surface, wo, random.unit4())
         })
         .collect();

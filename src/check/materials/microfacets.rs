@@ -42,6 +42,7 @@ pub(super) fn grazing(context: &Context) -> Result<Measure> {
             let surface = Surface {
                 normal: DVec3::Z,
                 eta,
+                offset: DVec3::ZERO,
             };
             inputs.push(BsdfInput::new(place, &surface, wo, to_row(wi, 0.0)));
         }

@@ -49,6 +49,7 @@ fn both_ways(context: &Context, measure: &mut Measure) -> Result<()> {
         let surface = Surface {
             normal: n,
             eta: 1.0,
+            offset: glam::DVec3::ZERO,
         };
         there.push(BsdfInput::new(place, &surface, wo, to_row(wi, 0.0)));
         back.push(BsdfInput::new(place, &surface, wi, to_row(wo, 0.0)));
@@ -89,7 +90,12 @@ fn through_glass(context: &Context, measure: &mut Measure) -> Result<()> {
                 0.0
             };
             let wo = (wo - lift * normal).normalize();
-            BsdfInput::new(0, &Surface { normal, eta }, wo, u)
+            let surface = Surface {
+                normal,
+                eta,
+                offset: glam::DVec3::ZERO,
+            };
+            BsdfInput::new(0, &surface, wo, u)
         })
         .collect();
     let glass = [MaterialKind::from(Dielectric::smooth(1.5))];

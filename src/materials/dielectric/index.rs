@@ -119,7 +119,10 @@ impl Index {
         match self {
             Self::Constant(ior) => ("ior", Value::Number(*ior)),
             Self::Cauchy(terms) => ("cauchy", Value::Pair(*terms)),
-            Self::Sellmeier(Sellmeier { b, c }) => ("sellmeier", Value::Terms { b: *b, c: *c }),
+            Self::Sellmeier(Sellmeier { b, c }) => {
+                let terms = vec![("b", Value::Vector(*b)), ("c", Value::Vector(*c))];
+                ("sellmeier", Value::Table(terms))
+            }
         }
     }
 

@@ -11,10 +11,13 @@ use crate::materials::dielectric::fresnel;
 use crate::materials::{Event, Surface};
 use crate::reference::core::sampling::basis_around;
 use crate::statistics::{mean_and_error, normal_p};
-use crate::verify::{Cells, Outcome, Random};
+use crate::verify::{Cells, Outcome, Random, ULP};
 
 /// Angles of incidence, in degrees.
 pub const ANGLES: [f64; 4] = [0.0, 45.0, 85.0, 89.9];
+
+/// Where on a ball samples are drawn from materials that look at it.
+pub const OFFSETS: [DVec3; 2] = [DVec3::new(0.28, 0.72, 0.635), DVec3::new(0.28, 0.48, 0.831)];
 
 /// Rings about the mirror direction, narrow ones for narrow lobes.
 const EDGES: [f64; 7] = [0.0, 1.0e-4, 1.0e-3, 1.0e-2, 0.1, 1.0, 2.0];
@@ -47,7 +50,8 @@ pub struct Energy {
 }
 
 impl<'a> Draw<'a> {
-    /// `count` samples of the subject at each of [`ANGLES`], from either side where it transmits.
+    /// `count` samples of the subject at each of [`ANGLES`], from either side where it transmits, and where it looks at
+    /// the offset at each of [`OFFSETS`].
     ///
     /// # Errors
     /// If the device fails.
@@ -57,18 +61,23 @@ impl<'a> Draw<'a> {
             true => vec![kind.ior(), 1.0 / kind.ior()],
             false => vec![1.0],
         };
+        let offsets = match kind.form().offset {
+            true => &OFFSETS[..],
+            false => &[DVec3::ZERO],
+        };
         let places = etas
             .iter()
-            .flat_map(|eta| ANGLES.map(|angle| (*eta, angle)));
+            .flat_map(|eta| offsets.iter().map(move |offset| (*eta, *offset)))
+            .flat_map(|place| ANGLES.map(|angle| (place, angle)));
         places
-            .map(|(eta, degrees)| Self::new(subjects, subject, eta, degrees, count))
+            .map(|(place, degrees)| Self::new(subjects, subject, place, degrees, count))
             .collect()
     }
 
     fn new(
         subjects: &'a Subjects,
         subject: usize,
-        eta: f64,
+        (eta, offset): (f64, DVec3),
         degrees: f64,
         count: usize,
     ) -> Result<Self> {
@@ -77,11 +86,19 @@ impl<'a> Draw<'a> {
         let normal = DVec3::new(2.0, -1.0, 2.0) / 3.0;
         let (sin, cos) = f64::to_radians(degrees).sin_cos();
         let wo = cos * normal - sin * basis_around(normal).tangent;
-        let input = BsdfInput::new(subject, &Surface { normal, eta }, wo, [0.0; 4]);
-        let name = format!(
+        let surface = Surface {
+            normal,
+            eta,
+            offset,
+        };
+        let input = BsdfInput::new(subject, &surface, wo, [0.0; 4]);
+        let mut name = format!(
             "case {subject}, {}, eta {eta}, {degrees} degrees",
             kind.name()
         );
+        if kind.form().offset {
+            name += &format!(", at {offset}");
+        }
         let mut random = Random::new(&format!("draw {name}"));
         let inputs: Vec<BsdfInput> = (0..count)
             .map(|_| BsdfInput {
@@ -133,7 +150,7 @@ impl<'a> Draw<'a> {
 
     /// Cells about the direction of smooth reflection, or beyond the surface of refraction.
     fn cells(&self, beyond: bool) -> Cells {
-        let Surface { normal, eta } = self.surface;
+        let Surface { normal, eta, .. } = self.surface;
         let refraction = fresnel(self.cosine(), eta);
         let axis = match beyond {
             false => (-self.wo).reflect(normal),
@@ -164,24 +181,42 @@ impl<'a> Draw<'a> {
         sums
     }
 
-    /// Whether the samples follow the twin: directions its pdf, by chi-square over cells, and of delta lobes
-    /// each event its share. `wrong` turns the twin's normal and makes its eta larger, for companions.
+    /// Whether the samples follow the twin: directions its pdf, by chi-square over cells, of delta lobes each
+    /// event its share, and both where there are both. `wrong` turns the twin's normal and makes its eta larger,
+    /// for companions.
     #[must_use]
     pub fn follows(&self, wrong: f64) -> Outcome {
-        let p = if self.subjects.kinds[self.subject].is_delta() {
+        let kind = &self.subjects.kinds[self.subject];
+        let p = if kind.is_delta() {
             self.choices(wrong)
+        } else if kind.is_part_delta() {
+            // The less likely of two.
+            (2.0 * self.directions(wrong).min(self.reflections(wrong))).min(1.0)
         } else {
             self.directions(wrong)
         };
         (self.name.clone(), p)
     }
 
+    /// Whether so few samples are beside the delta lobe that hardly anything can be told of them.
+    #[must_use]
+    pub fn is_nearly_delta(&self) -> bool {
+        let beside = |s: &&Sampled| s.event & Event::DELTA.bits() == 0;
+        let few = self.samples.iter().filter(beside).count() < FEW as usize;
+        self.subjects.kinds[self.subject].is_part_delta() && few
+    }
+
     fn wrong_surface(&self, wrong: f64) -> Surface {
-        let Surface { normal, eta } = self.surface;
+        let Surface {
+            normal,
+            eta,
+            offset,
+        } = self.surface;
         let across = wrong * basis_around(normal).bitangent;
         Surface {
             normal: (normal + across).normalize(),
             eta: eta * (1.0 + wrong),
+            offset,
         }
     }
 
@@ -190,14 +225,17 @@ impl<'a> Draw<'a> {
         let kind = &self.subjects.kinds[self.subject];
         let uniform = self.subjects.is_uniform(self.subject);
         let surface = self.wrong_surface(wrong);
+        let share = kind.delta_share(&surface, self.wo);
         let p = |beyond: &bool| {
             let directions = self.samples.iter().map(|s| {
                 let lost = kind.transmits() && s.weight().max_element() == 0.0;
-                (!lost && is_beyond(&self.surface, s.wi()) == *beyond).then(|| s.wi())
+                let delta = s.event & Event::DELTA.bits() != 0;
+                let here = is_beyond(&self.surface, s.wi()) == *beyond;
+                (!lost && !delta && here).then(|| s.wi())
             });
             let pdf = |w: DVec3| match uniform {
                 _ if is_beyond(&surface, w) != *beyond => 0.0,
-                true => 1.0 / TAU,
+                true => (1.0 - share) / TAU,
                 false => kind.evaluate(&surface, self.wo, w).pdf,
             };
             let cells = self.cells(*beyond);
@@ -213,6 +251,24 @@ impl<'a> Draw<'a> {
         let sides = self.sides();
         let least = sides.iter().map(p).fold(1.0, f64::min);
         (least * sides.len() as f64).min(1.0)
+    }
+
+    /// p-value of how often the delta lobe beside others is chosen, whose direction must be that of a mirror.
+    fn reflections(&self, wrong: f64) -> f64 {
+        let delta = Event::DELTA.bits();
+        let chosen: Vec<&Sampled> = self.samples.iter().filter(|s| s.event == delta).collect();
+        let mirrored = (-self.wo).reflect(self.surface.normal);
+        let aside = |s: &&&Sampled| (s.wi() - mirrored).length() > 64.0 * ULP;
+        let kind = &self.subjects.kinds[self.subject];
+        let share = kind.delta_share(&self.wrong_surface(wrong), self.wo);
+        let (count, total) = (chosen.len() as f64, self.samples.len() as f64);
+        if chosen.iter().any(|s| aside(&s)) {
+            0.0
+        } else if share == 0.0 || share == 1.0 {
+            f64::from(u8::from(count == total * share))
+        } else {
+            normal_p((count - total * share) / (total * share * (1.0 - share)).sqrt())
+        }
     }
 
     /// p-value of how often each event is chosen, the least of all events.
@@ -257,16 +313,41 @@ impl<'a> Draw<'a> {
         let integrals = if kind.is_delta() {
             self.twins_moment(1)
         } else {
-            self.integrals(|w, beyond| {
+            let wide = self.integrals(|w, beyond| {
                 let scale = if beyond { self.eta() * self.eta() } else { 1.0 };
                 (scale * kind.evaluate(&self.surface, self.wo, w).f_cos).to_array()
-            })
+            });
+            let (share, weight) = self.delta_part();
+            std::array::from_fn(|c| wide[c] + share * weight[c])
         };
         Energy {
             drawn: drawn.map(|(mean, _)| mean),
             errors: drawn.map(|(_, error)| error),
             integrals,
         }
+    }
+
+    /// Probability and weight of the twin's delta lobe beside others.
+    fn delta_part(&self) -> (f64, DVec3) {
+        let kind = &self.subjects.kinds[self.subject];
+        let share = kind.delta_share(&self.surface, self.wo);
+        if share == 0.0 {
+            return (0.0, DVec3::ZERO);
+        }
+        let s = kind.sample(&self.surface, self.wo, [0.5, 0.5, 0.0, 0.5]);
+        assert!(s.event.is(Event::DELTA), "{}", self.name);
+        (share, s.weight)
+    }
+
+    /// The largest weight of uniform sampling in the mirror direction, by the twin.
+    #[must_use]
+    pub fn peak(&self) -> f64 {
+        let mirrored = (-self.wo).reflect(self.surface.normal);
+        let kind = &self.subjects.kinds[self.subject];
+        TAU * kind
+            .evaluate(&self.surface, self.wo, mirrored)
+            .f_cos
+            .max_element()
     }
 
     /// The mean of the k-th powers of the twin's weights, without what refraction takes.
@@ -296,14 +377,21 @@ impl<'a> Draw<'a> {
             });
         }
         let bounds: [f64; 12] = std::array::from_fn(|i| bound(i / 3, i % 3));
+        let (share, delta) = self.delta_part();
+        // What is left to the other lobes: nothing where the coat, say, reflects all.
+        let rest = 1.0 - share;
         let all = self.integrals(|w, _| -> [f64; 12] {
+            if rest == 0.0 {
+                return [0.0; 12];
+            }
             let f_cos = kind.evaluate(&self.surface, self.wo, w).f_cos;
             std::array::from_fn(|i| {
-                let weight = TAU * f_cos[i % 3];
-                over(weight.powi(i as i32 / 3 + 1) / TAU, bounds[i])
+                let weight = TAU * f_cos[i % 3] / rest;
+                over(rest * weight.powi(i as i32 / 3 + 1) / TAU, bounds[i])
             })
         });
-        std::array::from_fn(|k| std::array::from_fn(|c| all[3 * k + c]))
+        let of_delta = |k: usize, c: usize| over(share * delta[c].powi(k as i32 + 1), bound(k, c));
+        std::array::from_fn(|k| std::array::from_fn(|c| all[3 * k + c] + of_delta(k, c)))
     }
 }
 

@@ -117,8 +117,16 @@ impl Subjects {
             .map(|i| {
                 let normal = normal(random, i);
                 let wo = arrival(random, normal, i);
-                let eta = eta(random, kind, i);
-                BsdfInput::new(subject, &Surface { normal, eta }, wo, random.unit4())
+                let surface = Surface {
+                    normal,
+                    eta: eta(random, kind, i),
+                    // On a ball; nothing is drawn where nothing looks.
+                    offset: match kind.form().offset {
+                        true => random.direction(),
+                        false => DVec3::ZERO,
+                    },
+                };
+                BsdfInput::new(subject, &surface, wo, random.unit4())
             })
             .collect()
     }
@@ -128,7 +136,7 @@ impl Subjects {
     fn directions(&self, random: &mut Random, subject: usize, count: usize) -> Vec<BsdfInput> {
         let mut inputs = self.questions(random, subject, count);
         for (i, input) in inputs.iter_mut().enumerate() {
-            let Surface { normal, eta } = input.surface();
+            let Surface { normal, eta, .. } = input.surface();
             let near = if self.kinds[subject].is_translucent() && i % 4 == 0 {
                 let cosine = normal.dot(input.wo()).clamp(0.0, 1.0);
                 (cosine / eta - fresnel(cosine, eta).cos_t) * normal - input.wo() / eta
@@ -169,10 +177,15 @@ impl Question {
             (DVec3::new(x, y, z), w)
         };
         let ((normal, eta), (wo, w), (u, _)) = (off(), off(), off());
+        let offset = match self.surface.offset == DVec3::ZERO {
+            true => DVec3::ZERO,
+            false => off().0,
+        };
         Self {
             surface: Surface {
                 normal: self.surface.normal + normal,
                 eta: self.surface.eta * (1.0 + eta),
+                offset: self.surface.offset + offset,
             },
             wo: self.wo + wo,
             u: [

@@ -67,7 +67,9 @@ pub fn weights(
         .zip(samples)
         .filter(|(input, s)| {
             let above = s.wi().dot(input.surface().normal) > 0.0;
-            s.weight().max_element() > 0.0 && s.pdf > 0.0 && (above || transmits)
+            // What went into a delta lobe beside others has no value.
+            let delta = s.event & Event::DELTA.bits() != 0;
+            s.weight().max_element() > 0.0 && s.pdf > 0.0 && (above || transmits) && !delta
         })
         .map(|(input, s)| {
             let u = [s.wi[0], s.wi[1], s.wi[2], 0.0];

@@ -184,7 +184,11 @@ fn compare(
 
 /// The question with its normal turned by `angle`, and eta larger by that share.
 fn turned(question: &Question, angle: f64) -> Question {
-    let Surface { normal, eta } = question.surface;
+    let Surface {
+        normal,
+        eta,
+        offset,
+    } = question.surface;
     let turned = normal + angle * normal.any_orthonormal_vector();
     let normal = if angle == 0.0 {
         normal
@@ -195,6 +199,7 @@ fn turned(question: &Question, angle: f64) -> Question {
         surface: Surface {
             normal,
             eta: eta * (1.0 + angle),
+            offset,
         },
         ..*question
     }
