@@ -144,15 +144,17 @@ fn check_value(
     report: &mut Report,
 ) {
     let kind = match schema["type"].as_array() {
-        // A number, or a word, or an array.
+        // A number, or a word, or an array, or a table.
         Some(kinds) => kinds
             .iter()
             .filter_map(Value::as_str)
             .find(|kind| match value.get_ref() {
                 DeValue::String(_) => *kind == "string",
                 DeValue::Array(_) => *kind == "array",
+                DeValue::Table(_) => *kind == "object",
                 _ => *kind == "number",
             })
+            .or(kinds[0].as_str())
             .unwrap_or("number"),
         None => schema["type"].as_str().unwrap_or("object"),
     };
@@ -262,6 +264,8 @@ fn length(name: &str, span: Range<usize>, length: usize, schema: &Value, report:
     };
     if length as u64 != wanted {
         let what = match schema["items"]["minItems"].as_u64() {
+            // Of a texture.
+            Some(_) if wanted == 2 => "values",
             Some(_) => "rows",
             None => "numbers",
         };
