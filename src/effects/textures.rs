@@ -69,7 +69,9 @@ pub(super) fn rows() -> Vec<Row> {
         ])
         .marks([member]);
         match *key {
-            EMISSION => row.needs([Effect::Emission]),
+            EMISSION => row
+                .needs([Effect::Emission])
+                .marks(["emission_at", "radiance_seen"]),
             _ => row.needs(forms_that(|form| form.texturable().any(|t| t.key == *key))),
         }
     });
