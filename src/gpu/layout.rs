@@ -314,7 +314,7 @@ pub fn anchored_spheres<'a>(
     scene: &'a Scene,
     placement: &'a Placement,
 ) -> impl Iterator<Item = usize> + 'a {
-    let is_anchored = |i: &usize| {
+    let is_anchored = move |i: &usize| {
         let material = &scene.materials[placement.spheres[*i].material];
         !material.kind.form().anchored.is_empty() || material.has_patterns()
     };

@@ -150,7 +150,8 @@ impl PathTracer<'_> {
         let material = &self.scene.materials[sphere.material];
         let vertex = vertex_at(&path.ray, &hit, sphere);
         let point = self.point_at(&hit, &vertex);
-        let kind = &*kind_at(material, &point);
+        let kind = kind_at(material, &point);
+        let kind = &*kind;
         let share = self.share_of_emission(&path.ray, &hit, path.departure);
         let emission = emission_at(material, &point);
         path.receive(path.class, path.throughput * share * emission);

@@ -294,7 +294,8 @@ fn missing_key(key: &str, schema: &Value, place: &Place) -> Problem {
     let message = format!("`{key}` is missing in {}", place.name);
     let problem = Problem::new(place.header.clone(), message, "");
     let description = schema["description"].as_str().unwrap_or_default();
-    let example = match schema["type"].as_str() {
+    let kind = schema["type"].as_str().or(schema["type"][0].as_str());
+    let example = match kind {
         Some("object") => {
             let inner = schema["required"].as_array();
             let inner = inner.into_iter().flatten().filter_map(Value::as_str);

@@ -107,7 +107,7 @@ pub(super) fn apply(
             continue;
         };
         let axis = axis_of(&textures, material, report);
-        for (key, span, table) in &textures.tables {
+        for &(key, ref span, ref table) in &textures.tables {
             let place = Place {
                 key,
                 span: span.clone(),
@@ -190,8 +190,8 @@ fn check_keys(table: &TextureTable, place: &Place<'_>, report: &mut Report) -> b
     let patterns = ["checker", "noise"];
     let further = [
         ("linear", table.linear.as_ref().map(Spanned::span), &["image"][..]),
-        ("size", table.size.as_ref().map(Spanned::span), &patterns),
-        ("octaves", table.octaves.as_ref().map(Spanned::span), &["noise"]),
+        ("size", table.size.as_ref().map(Spanned::span), &patterns[..]),
+        ("octaves", table.octaves.as_ref().map(Spanned::span), &["noise"][..]),
     ];
     for (key, at, of) in further {
         if let Some(at) = at.filter(|_| !of.contains(&first)) {
