@@ -1,6 +1,7 @@
 //! The variance of one sample of what a material scatters, f cos/pdf, over the square of its mean: what its
 //! sampling leaves of the noise, by the f64 twin. At 45 degrees it is at most 0.3, in every channel and in
-//! luminance; docs/materials.md has the figures.
+//! luminance; but in a channel of car paint, which may have lobes of quite different hues, it is at most what is known of
+//! its choice of lobes. docs/materials.md has the figures.
 //!
 //! The power: sampling by the cosine alone, which is what no material would be without its own, is beyond that
 //! for every narrow lobe.
@@ -9,11 +10,20 @@ use glam::{DVec2, DVec3};
 use gpu_trace::materials::{ALL, MaterialKind, Surface, luminance};
 use gpu_trace::reference::core::sampling::{basis_around, cosine_direction};
 use gpu_trace::statistics::mean_and_error;
+use gpu_trace::verify::bsdf::draw::OFFSETS;
 use gpu_trace::verify::Random;
 
 /// Those whose sampling is no closed matter.
-const MATERIALS: &[&str] = &["ashikhmin", "disney", "sheen", "nylon"];
+const MATERIALS: &[&str] = &["ashikhmin", "disney", "sheen", "nylon", "car-paint"];
 const BAR: f64 = 0.3;
+/// Of a channel.
+fn bar(name: &str) -> f64 {
+    match name {
+        "car-paint" => 1.0,
+        _ => BAR,
+    }
+}
+
 /// So many that the ratio is known to about 1 %.
 const SAMPLES: usize = 200_000;
 
@@ -39,20 +49,30 @@ fn ratios(mut weight: impl FnMut(&mut Random) -> DVec3, name: &str) -> Ratios {
     ]
 }
 
+/// Where a material is looked at: one that looks at the offset on a flake and beside.
+fn places(kind: &MaterialKind) -> &'static [(&'static str, DVec3)] {
+    const ON: (&str, DVec3) = (", on a flake", OFFSETS[0]);
+    const BESIDE: (&str, DVec3) = (", beside", OFFSETS[1]);
+    match kind.form().offset {
+        true => &[ON, BESIDE],
+        false => &[("", DVec3::ZERO)],
+    }
+}
+
 /// At 45 degrees, about a normal along no axis.
-fn place() -> (Surface, DVec3) {
+fn place(offset: DVec3) -> (Surface, DVec3) {
     let normal = DVec3::new(2.0, -1.0, 2.0) / 3.0;
     let wo = (normal - basis_around(normal).tangent).normalize();
     let surface = Surface {
         normal,
         eta: 1.0,
-        offset: DVec3::ZERO,
+        offset,
     };
     (surface, wo)
 }
 
-fn by_its_own(kind: &MaterialKind) -> Ratios {
-    let (surface, wo) = place();
+fn by_its_own(kind: &MaterialKind, offset: DVec3) -> Ratios {
+    let (surface, wo) = place(offset);
     let weight = |random: &mut Random| {
         let u = random.unit4().map(f64::from);
         kind.sample(&surface, wo, u).weight
@@ -60,8 +80,8 @@ fn by_its_own(kind: &MaterialKind) -> Ratios {
     ratios(weight, "own")
 }
 
-fn by_the_cosine(kind: &MaterialKind) -> Ratios {
-    let (surface, wo) = place();
+fn by_the_cosine(kind: &MaterialKind, offset: DVec3) -> Ratios {
+    let (surface, wo) = place(offset);
     let weight = |random: &mut Random| {
         let [x, y, ..] = random.unit4().map(f64::from);
         let wi = cosine_direction(surface.normal, DVec2::new(x, y));
@@ -76,7 +96,7 @@ fn largest(ratios: &Ratios) -> f64 {
 }
 
 /// The figures of a row of the table in docs/materials.md; none, if there is no such row.
-fn documented(name: &str, case: usize) -> Vec<f64> {
+fn documented(name: &str, case: &str) -> Vec<f64> {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/materials.md");
     let text = std::fs::read_to_string(path).expect(path);
     let start = format!("| `{name}` {case} |");
@@ -93,18 +113,24 @@ fn sampling_leaves_little() {
     for name in MATERIALS {
         let material = ALL.iter().find(|m| m.name == *name).expect(name);
         let mut beyond = 0;
-        for (i, kind) in (material.cases)().iter().enumerate() {
-            let (own, cosine) = (by_its_own(kind), by_the_cosine(kind));
+        let cases = (material.cases)();
+        let places = (1..).zip(&cases).flat_map(|(i, kind)| {
+            places(kind)
+                .iter()
+                .map(move |(at, offset)| (format!("{i}{at}"), kind, *offset))
+        });
+        for (case, kind, offset) in places {
+            let (own, cosine) = (by_its_own(kind, offset), by_the_cosine(kind, offset));
             let [all, red, green, blue] = own;
-            let case = i + 1;
             // The table's rows.
             eprintln!(
                 "| `{name}` {case} | {all:.3} | {red:.3} | {green:.3} | {blue:.3} | {:.2} |",
                 cosine[0]
             );
-            let said = documented(name, case);
+            let said = documented(name, &case);
             let as_said = own.iter().zip(&said).all(|(a, b)| (a - b).abs() <= 0.01);
-            if largest(&own) > BAR || said.len() != 5 || !as_said {
+            let within = all <= BAR && largest(&own) <= bar(name);
+            if !within || said.len() != 5 || !as_said {
                 faults.push(format!("{name} {case}: {own:?}, documented {said:?}"));
             }
             beyond += usize::from(largest(&cosine) > BAR);

@@ -19,7 +19,7 @@ use std::collections::BTreeSet;
 use std::sync::LazyLock;
 
 use crate::materials::texturable::textured_keys;
-use crate::materials::{Form, forms};
+use crate::materials::{Form, flakes, forms};
 use crate::placement::{PlacedSphere, Placement};
 use crate::scene::{Material, Scene};
 use crate::settings::Settings;
@@ -385,6 +385,12 @@ impl Effects {
         })
     }
 
+    /// Whether a paint has flakes.
+    #[must_use]
+    pub fn has_flakes(&self) -> bool {
+        self.forms().any(|(_, form)| flakes::are_in(form))
+    }
+
     /// Whether lights are weighed at each vertex.
     #[must_use]
     pub fn weighs_lights(&self) -> bool {
@@ -421,6 +427,7 @@ impl Effects {
             ("offset", self.looks_at_offset()),
             ("textured", self.has_textures()),
             ("patterned", self.has_patterns()),
+            ("flaked", self.has_flakes()),
             ("weighed", self.weighs_lights()),
             ("sampled", self.samples_light()),
             ("through", self.looks_through()),

@@ -5,6 +5,9 @@ use std::f64::consts::{PI, TAU};
 
 use glam::{DVec2, DVec3};
 
+use super::lobes::Pair;
+use super::powers::log1p_over;
+
 /// The least cosine of a facet that the kernel has.
 const LEAST_COS: f64 = 1.0e-3;
 
@@ -15,55 +18,27 @@ pub struct Facets {
     pub cos_h: f64,
     /// Square of its tangent.
     pub tan2: f64,
-    /// Cosine of the half vector with both directions.
-    pub oh: f64,
-    /// G1(o)/(4 co) over ch; 0 where one of the directions is below the normal's horizon.
+    /// G1(o)/(4 co) over ch.
     pub visible: f64,
-    /// G2/(G1(o) ci), or 0.
+    /// G2/(G1(o) ci); 0 where one of the directions is below the horizon.
     pub both: f64,
 }
 
-/// The direction halfway between two, and its cosine with either.
-#[derive(Clone, Copy, Debug)]
-pub struct Halfway {
-    /// The direction.
-    pub h: DVec3,
-    /// The cosine.
-    pub oh: f64,
-}
-
-impl Halfway {
-    /// That between wo and wi.
-    #[must_use]
-    pub fn between(wo: DVec3, wi: DVec3) -> Self {
-        let sum = wo + wi;
-        Self {
-            h: sum.normalize(),
-            oh: 0.5 * sum.length(),
-        }
-    }
-}
-
 impl Facets {
-    /// Those about `normal`; `cos_o`: of wo with it.
+    /// Those that reflect the one direction into the other, in a frame about the normal.
     #[must_use]
-    pub fn about(normal: DVec3, cos_o: f64, wi: DVec3, between: Halfway) -> Self {
-        let Halfway { h, oh } = between;
-        let cos_i = normal.dot(wi);
-        let cos_h = normal.dot(h).max(LEAST_COS);
-        let double_o = 2.0 * cos_h * cos_o;
-        let both = 2.0 * cos_h / (2.0 * cos_h * cos_i).max(oh.min(double_o));
-        let [visible, both] = if cos_o >= 0.0 && cos_i > 0.0 {
-            [0.5 / oh.max(double_o), both]
-        } else {
-            [0.0; 2]
-        };
+    pub fn of(pair: &Pair) -> Self {
+        let cos_h = pair.h.z.max(LEAST_COS);
+        let (double_o, double_i) = (2.0 * cos_h * pair.o.z, 2.0 * cos_h * pair.i.z);
+        let lit = pair.o.z >= 0.0 && pair.i.z > 0.0;
         Self {
             cos_h,
-            tan2: normal.cross(h).length_squared() / (cos_h * cos_h),
-            oh,
-            visible,
-            both,
+            tan2: pair.h.truncate().length_squared() / (cos_h * cos_h),
+            visible: 0.5 / pair.cos_h.max(double_o),
+            both: match lit {
+                true => 2.0 * cos_h / double_i.max(pair.cos_h.min(double_o)),
+                false => 0.0,
+            },
         }
     }
 
@@ -74,16 +49,16 @@ impl Facets {
     }
 }
 
-/// -log(1 - u)
+/// The square of a slope of width 1: -log(1 - u).
 #[must_use]
-pub fn minus_log(u: f64) -> f64 {
-    -(-u).ln_1p()
+pub fn beckmann_slope2(u: f64) -> f64 {
+    u * log1p_over(-u)
 }
 
-/// A normal that wo sees, in a frame about z.
+/// A normal that wo sees.
 #[must_use]
 pub fn beckmann_normal(wo: DVec3, m: f64, u: DVec2, v: f64) -> DVec3 {
-    let slope = m * minus_log(u.x).sqrt() * DVec2::from_angle(TAU * u.y);
+    let slope = m * beckmann_slope2(u.x).sqrt() * DVec2::from_angle(TAU * u.y);
     let h = slope.extend(1.0).normalize();
     let along = wo.truncate().dot(h.truncate());
     let front = (wo.z * h.z + along).max(0.0);

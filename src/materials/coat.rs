@@ -5,7 +5,8 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::dielectric::fresnel;
-use super::paint::{Paint, mean_weight};
+use super::paint::{Paint, Weights, choosable};
+use super::scattered::mean_over;
 use super::schema::MAX_MAGNITUDE;
 use super::{BsdfSample, BsdfValue, Event};
 
@@ -25,11 +26,12 @@ pub(super) struct Coat {
     eta: f64,
     /// 1 - F(cos_o)
     through: f64,
-    /// What the coat and the paint below reflect, about.
-    kept: f64,
-    /// Probability of reflection, and what is left of 1.
+    /// Probability of reflection, its weight, and what is left of the probability.
     pub(super) share: f64,
+    weight: f64,
     beneath: f64,
+    /// In proportion to what the parts below are chosen.
+    weights: [f64; 4],
 }
 
 fn coat_transmits(cos_i: f64, eta: f64) -> f64 {
@@ -40,39 +42,44 @@ fn coat_transmits(cos_i: f64, eta: f64) -> f64 {
 }
 
 impl Coat {
-    /// Chosen in proportion to what each reflects, about.
+    /// What it reflects is one of the parts.
     pub(super) fn over(paint: &Paint, eta: f64, wo: DVec3) -> Self {
-        let cos_o = paint.normal.dot(wo).clamp(0.0, 1.0);
-        let through = coat_transmits(cos_o, eta);
-        let reflected = 1.0 - through;
-        let below = through * paint.strengths(wo).iter().sum::<f64>().min(1.0);
-        let kept = reflected + below;
-        let [share, beneath] = if kept > 0.0 {
-            [reflected / kept, below / kept]
+        let through = coat_transmits(paint.frame.normal().dot(wo).clamp(0.0, 1.0), eta);
+        let parts = paint.parts(wo).map(|part| through * part);
+        let chosen = Weights::of(parts, 1.0 - through);
+        let below: f64 = chosen.parts.iter().sum();
+        let all = chosen.coat + below;
+        let [share, beneath] = if below > 0.0 {
+            [chosen.coat / all, below / all]
+        } else if chosen.coat > 0.0 {
+            [1.0, 0.0]
         } else {
             [0.0, 1.0]
         };
         Self {
             eta,
             through,
-            kept,
             share,
+            weight: chosen.least * all,
             beneath,
+            weights: choosable(chosen.parts),
         }
     }
 
     pub(super) fn sample(&self, paint: &Paint, wo: DVec3, u: [f64; 3]) -> BsdfSample {
+        let normal = paint.frame.normal();
         if u[2] < self.share {
             return BsdfSample {
-                wi: (-wo).reflect(paint.normal).normalize(),
-                weight: DVec3::splat(self.kept),
+                wi: (-wo).reflect(normal).normalize(),
+                weight: DVec3::splat(self.weight),
                 pdf: 0.0,
                 event: Event::DELTA,
                 eta: 1.0,
             };
         }
-        let s = paint.sample(wo, [u[0], u[1], (u[2] - self.share) / self.beneath]);
-        let back = coat_transmits(paint.normal.dot(s.wi), self.eta);
+        let u = [u[0], u[1], (u[2] - self.share) / self.beneath];
+        let s = paint.sample(&self.weights, wo, u);
+        let back = coat_transmits(normal.dot(s.wi), self.eta);
         BsdfSample {
             weight: self.through * back / self.beneath * s.weight,
             pdf: self.beneath * s.pdf,
@@ -81,8 +88,8 @@ impl Coat {
     }
 
     pub(super) fn evaluate(&self, paint: &Paint, wo: DVec3, wi: DVec3) -> BsdfValue {
-        let value = paint.evaluate(wo, wi);
-        let back = coat_transmits(paint.normal.dot(wi), self.eta);
+        let value = paint.evaluate(&self.weights, wo, wi);
+        let back = coat_transmits(paint.frame.normal().dot(wi), self.eta);
         BsdfValue {
             f_cos: self.through * back * value.f_cos,
             pdf: self.beneath * value.pdf,
@@ -93,10 +100,11 @@ impl Coat {
 
 /// The share of light along the normal that comes back from the paint and that the coat does not let out.
 pub(super) fn lost_below(paint: &Paint, ior: f64) -> f64 {
-    let kept = |wo, u| {
-        let s = paint.sample(wo, u);
-        (1.0 - coat_transmits(paint.normal.dot(s.wi), ior)) * s.weight
-    };
-    let kept = mean_weight(paint.normal, 1.0, kept).max_element();
-    coat_transmits(1.0, ior) * kept
+    let normal = paint.frame.normal();
+    let weights = paint.weights(normal);
+    let kept = mean_over(|[x, y, z, _]| {
+        let s = paint.sample(&weights, normal, [x, y, z]);
+        (1.0 - coat_transmits(normal.dot(s.wi), ior)) * s.weight
+    });
+    coat_transmits(1.0, ior) * kept.max_element()
 }

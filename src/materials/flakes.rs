@@ -4,10 +4,10 @@ use glam::{DVec2, DVec3};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::beckmann::minus_log;
+use super::beckmann::beckmann_slope2;
 use super::lattice::{LatticePoint, anchor_members};
 use super::schema::{self, MAX_MAGNITUDE};
-use super::{Member, MemberValue, Surface, Value};
+use super::{Form, Member, MemberValue, Surface, Value};
 use crate::reference::core::random::{mix_bits, unit_float};
 use crate::reference::core::sampling::circle_point;
 
@@ -21,6 +21,11 @@ pub(super) const FLAKE_MEMBERS: [Member; 5] = [
     Member::scalar("flake_spread"),
     Member::scalar("flake_jitter"),
 ];
+
+/// Whether a form has them.
+pub(crate) fn are_in(form: &Form) -> bool {
+    FLAKE_MEMBERS.iter().all(|member| form.members.contains(member))
+}
 
 /// And where poles are in their lattice.
 pub(super) const FLAKE_ANCHOR: [Member; 4] = anchor_members(
@@ -125,7 +130,7 @@ pub fn flake_at(point: &LatticePoint, density: f64, jitter: f64) -> Option<[u32;
 #[must_use]
 pub fn flake_normal(cell: [u32; 3], spread: f64, normal: DVec3) -> DVec3 {
     let [a, b, c, d] = unit_float(flake_words(cell, 1));
-    let across: DVec2 = minus_log(a).sqrt() * circle_point(b);
-    let tilt = spread * across.extend(minus_log(c).sqrt() * circle_point(d).x);
+    let across: DVec2 = beckmann_slope2(a).sqrt() * circle_point(b);
+    let tilt = spread * across.extend(beckmann_slope2(c).sqrt() * circle_point(d).x);
     (normal + tilt - tilt.dot(normal) * normal).normalize()
 }

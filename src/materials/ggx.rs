@@ -53,6 +53,12 @@ impl Frame {
         }
     }
 
+    /// The vector along z.
+    #[must_use]
+    pub fn normal(&self) -> DVec3 {
+        self.normal
+    }
+
     /// The vector's components.
     #[must_use]
     pub fn to_local(&self, w: DVec3) -> DVec3 {

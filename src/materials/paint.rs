@@ -1,13 +1,15 @@
 //! Paint: Lambert and three Cook-Torrance lobes; twin of `shaders/materials/paint.wesl`, which has the formulas and
 //! their source.
 
-use std::f64::consts::PI;
+use std::f64::consts::FRAC_1_PI;
 
-use glam::{DMat3, DVec2, DVec3};
+use glam::{DVec2, DVec3};
 
-use super::beckmann::{Facets, Halfway, beckmann_normal};
-use super::{BsdfSample, BsdfValue, Event};
-use crate::reference::core::sampling::{basis_around, cosine_direction};
+use super::beckmann::{Facets, beckmann_normal};
+use super::ggx::Frame;
+use super::lobes::{Lobes, Pair, arrival, schlick};
+use super::{BsdfSample, BsdfValue};
+use crate::reference::core::sampling::cosine_direction;
 
 /// Cook and Torrance's lobe.
 #[derive(Clone, Copy, Debug)]
@@ -22,172 +24,151 @@ pub(super) struct Lobe {
 /// All of it at a point.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Paint {
-    pub(super) normal: DVec3,
+    pub(super) frame: Frame,
     pub(super) diffuse: DVec3,
     pub(super) lobes: [Lobe; 3],
-    /// That the third lobe is about.
-    pub(super) third_normal: DVec3,
+    /// About the normal of the third lobe, where a flake turns it.
+    pub(super) third_frame: Option<Frame>,
 }
 
-fn schlick(f0: f64, cosine: f64) -> f64 {
-    f0 + (1.0 - f0) * (1.0 - cosine).max(0.0).powi(5)
+/// In proportion to what parts are chosen: the diffuse one, and the lobes.
+pub(super) struct Weights {
+    pub(super) parts: [f64; 4],
+    /// Of a coat over them.
+    pub(super) coat: f64,
+    /// What all reflect together, in the channel that has the least.
+    pub(super) least: f64,
 }
 
-pub(super) fn mean(color: DVec3) -> f64 {
-    color.element_sum() / 3.0
-}
-
-impl Lobe {
-    /// f cos, and the pdf.
-    fn value(&self, f: &Facets, cos_i: f64) -> (DVec3, f64) {
-        let pdf = f.pdf(self.m);
-        let share = pdf * f.both * cos_i * schlick(self.f0, f.oh);
-        (share * self.color, pdf)
+impl Weights {
+    /// Each part by the largest share that it has in a channel.
+    pub(super) fn of(parts: [DVec3; 4], coat: f64) -> Self {
+        let all = coat + parts.iter().sum::<DVec3>();
+        let largest = |part: DVec3| {
+            let shares = DVec3::select(all.cmpgt(DVec3::ZERO), part / all, DVec3::ZERO);
+            shares.max_element()
+        };
+        Self {
+            parts: parts.map(largest),
+            coat: largest(DVec3::splat(coat)),
+            least: all.min_element(),
+        }
     }
 }
 
 /// Of black paint all is diffuse.
-fn shares_of(strengths: [f64; 4]) -> [f64; 4] {
-    let all: f64 = strengths.iter().sum();
-    if all > 0.0 {
-        strengths.map(|s| s / all)
+pub(super) fn choosable(weights: [f64; 4]) -> [f64; 4] {
+    if weights.iter().sum::<f64>() > 0.0 {
+        weights
     } else {
         [1.0, 0.0, 0.0, 0.0]
     }
 }
 
-/// A direction about visible normals, and the facet that reflects it.
-fn reflection(normal: DVec3, m: f64, wo: DVec3, u: DVec2, v: f64) -> (DVec3, Halfway) {
-    let basis = basis_around(normal);
-    let frame = DMat3::from_cols(basis.tangent, basis.bitangent, normal);
-    let mut o = frame.transpose() * wo;
-    o.z = o.z.max(0.0);
-    let h = beckmann_normal(o, m, u, v);
-    let oh = o.dot(h);
-    let wi = (frame * (2.0 * oh * h - o)).normalize();
-    (wi, Halfway { h: frame * h, oh })
+/// A pair from one frame in another, where wo is `o`.
+fn turned(pair: &Pair, o: DVec3, from: &Frame, to: &Frame) -> Pair {
+    let turn = |w: DVec3| to.to_local(from.to_world(w));
+    Pair {
+        o,
+        i: turn(pair.i),
+        h: turn(pair.h),
+        ..*pair
+    }
 }
 
-/// The mean weight of samples over a grid of uniform numbers, to some 1e-3, for light that arrives at `cos_o`.
-pub(super) fn mean_weight(
-    normal: DVec3,
-    cos_o: f64,
-    weight: impl Fn(DVec3, [f64; 3]) -> DVec3,
-) -> DVec3 {
-    // Most along the choice of a lobe, whose parts of the unit interval are of any length.
-    const GRID: [u32; 3] = [8, 8, 64];
-    let sine = (1.0 - cos_o * cos_o).sqrt();
-    let wo = sine * normal.any_orthonormal_vector() + cos_o * normal;
-    let mut sum = DVec3::ZERO;
-    let count: u32 = GRID.iter().product();
-    for i in 0..count {
-        let cell = [i % GRID[0], i / GRID[0] % GRID[1], i / GRID[0] / GRID[1]];
-        let u = [0, 1, 2].map(|k| (f64::from(cell[k]) + 0.5) / f64::from(GRID[k]));
-        sum += weight(wo, u);
+impl Lobe {
+    fn reflectance(&self, cosine: f64) -> f64 {
+        self.f0 + (1.0 - self.f0) * schlick(cosine)
     }
-    sum / f64::from(count)
+
+    /// f cos, and the pdf.
+    fn value(&self, pair: &Pair, f: &Facets, cos_i: f64) -> (DVec3, f64) {
+        let pdf = f.pdf(self.m);
+        let share = pdf * f.both * cos_i * self.reflectance(pair.cos_h);
+        (share * self.color, pdf)
+    }
 }
 
 impl Paint {
-    fn lobe_normal(&self, lobe: usize) -> DVec3 {
-        [self.normal, self.normal, self.third_normal][lobe]
-    }
-
-    /// The cosine of wo with the normal of a lobe; negative on the back of a flake.
-    fn cos_o(&self, lobe: usize, wo: DVec3) -> f64 {
-        match lobe {
-            2 if self.third_normal != self.normal => self.third_normal.dot(wo),
-            _ => self.normal.dot(wo).max(0.0),
-        }
-    }
-
     /// What each part reflects, about: the diffuse one, and the lobes.
-    pub(super) fn strengths(&self, wo: DVec3) -> [f64; 4] {
-        let lobe = |k: usize| {
-            let (Lobe { color, f0, .. }, cos_o) = (self.lobes[k], self.cos_o(k, wo));
-            match cos_o >= 0.0 {
-                true => mean(color) * schlick(f0, cos_o),
-                false => 0.0,
-            }
+    pub(super) fn parts(&self, wo: DVec3) -> [DVec3; 4] {
+        let cos_o = self.frame.normal().dot(wo).clamp(0.0, 1.0);
+        let cos_third = self
+            .third_frame
+            .map_or(cos_o, |frame| frame.normal().dot(wo).min(1.0));
+        let [first, second, third] = self.lobes;
+        let of_third = match cos_third >= 0.0 {
+            true => third.reflectance(cos_third) * third.color,
+            false => DVec3::ZERO,
         };
-        [mean(self.diffuse), lobe(0), lobe(1), lobe(2)]
+        [
+            self.diffuse,
+            first.reflectance(cos_o) * first.color,
+            second.reflectance(cos_o) * second.color,
+            of_third,
+        ]
     }
 
-    pub(super) fn evaluate(&self, wo: DVec3, wi: DVec3) -> BsdfValue {
-        self.evaluate_between(wo, wi, Halfway::between(wo, wi))
+    /// In proportion to what parts are chosen without a coat.
+    pub(super) fn weights(&self, wo: DVec3) -> [f64; 4] {
+        choosable(Weights::of(self.parts(wo), 0.0).parts)
     }
 
-    fn evaluate_between(&self, wo: DVec3, wi: DVec3, between: Halfway) -> BsdfValue {
-        let cos_i = self.normal.dot(wi);
-        if cos_i <= 0.0 {
-            return BsdfValue {
-                f_cos: DVec3::ZERO,
-                pdf: 0.0,
-                event: Event::DIFFUSE,
-            };
+    /// `third`: the same pair in the third lobe's frame.
+    fn lobes(&self, weights: &[f64; 4], pair: &Pair, third: &Pair) -> Lobes {
+        let (f, g) = (Facets::of(pair), Facets::of(third));
+        let cosine = pair.i.z * FRAC_1_PI;
+        let mut lobes = Lobes {
+            diffuse: cosine * self.diffuse,
+            glossy: DVec3::ZERO,
+            pdf: weights[0] * cosine,
+        };
+        for ((lobe, facets), weight) in self.lobes.iter().zip([&f, &f, &g]).zip(&weights[1..]) {
+            let (f_cos, pdf) = lobe.value(pair, facets, pair.i.z);
+            lobes.glossy += f_cos;
+            lobes.pdf += weight * pdf;
         }
-        let q = shares_of(self.strengths(wo));
-        let diffuse = cos_i / PI * self.diffuse;
-        let (mut glossy, mut pdf) = (DVec3::ZERO, q[0] * cos_i / PI);
-        for (k, lobe) in self.lobes.iter().enumerate() {
-            let facets = Facets::about(self.lobe_normal(k), self.cos_o(k, wo), wi, between);
-            let (f_cos, of_lobe) = lobe.value(&facets, cos_i);
-            glossy += f_cos;
-            pdf += q[k + 1] * of_lobe;
-        }
-        BsdfValue {
-            f_cos: diffuse + glossy,
-            pdf,
-            event: if mean(glossy) >= mean(diffuse) {
-                Event::GLOSSY
-            } else {
-                Event::DIFFUSE
-            },
-        }
+        lobes.pdf /= weights.iter().sum::<f64>();
+        lobes
     }
 
-    // Below the horizon the path ends: it would meet another facet.
-    pub(super) fn sample(&self, wo: DVec3, u: [f64; 3]) -> BsdfSample {
-        let q = shares_of(self.strengths(wo));
-        let place = DVec2::new(u[0], u[1]);
-        let begin = [q[0], q[0] + q[1], q[0] + q[1] + q[2]];
-        let chosen = (1..3).rev().find(|k| u[2] >= begin[*k]).unwrap_or(0);
-        let (wi, between) = if u[2] < q[0] {
-            let wi = cosine_direction(self.normal, place);
-            (wi, Halfway::between(wo, wi))
+    pub(super) fn evaluate(&self, weights: &[f64; 4], wo: DVec3, wi: DVec3) -> BsdfValue {
+        let pair = Pair::between(arrival(&self.frame, wo), self.frame.to_local(wi));
+        let third = self.third_frame.map_or(pair, |frame| {
+            Pair::between(frame.to_local(wo), frame.to_local(wi))
+        });
+        self.lobes(weights, &pair, &third).value(&pair)
+    }
+
+    pub(super) fn sample(&self, weights: &[f64; 4], wo: DVec3, u: [f64; 3]) -> BsdfSample {
+        let (o, plane) = (arrival(&self.frame, wo), DVec2::new(u[0], u[1]));
+        let [diffuse, lobes @ ..] = weights;
+        let mut place = u[2] * weights.iter().sum::<f64>() - diffuse;
+        let third_frame = self.third_frame.unwrap_or(self.frame);
+        let a = self.third_frame.map_or(o, |frame| frame.to_local(wo));
+        if place < 0.0 {
+            let pair = Pair::between(o, cosine_direction(DVec3::Z, plane));
+            let third = turned(&pair, a, &self.frame, &third_frame);
+            return self.lobes(weights, &pair, &third).sample(&self.frame, &pair);
+        }
+        let mut chosen = 0;
+        while chosen < 2 && place >= lobes[chosen] {
+            place -= lobes[chosen];
+            chosen += 1;
+        }
+        let normal = |o| beckmann_normal(o, self.lobes[chosen].m, plane, place / lobes[chosen]);
+        let (pair, third) = if chosen == 2 {
+            let third = Pair::about(a, normal(a));
+            (turned(&third, o, &third_frame, &self.frame), third)
         } else {
-            let v = (u[2] - begin[chosen]) / q[chosen + 1].max(1.0e-30);
-            let m = self.lobes[chosen].m;
-            reflection(self.lobe_normal(chosen), m, wo, place, v)
+            let pair = Pair::about(o, normal(o));
+            (pair, turned(&pair, a, &self.frame, &third_frame))
         };
-        let value = self.evaluate_between(wo, wi, between);
-        BsdfSample {
-            wi,
-            weight: if value.pdf > 0.0 {
-                value.f_cos / value.pdf
-            } else {
-                DVec3::ZERO
-            },
-            pdf: value.pdf,
-            event: value.event,
-            eta: 1.0,
-        }
+        self.lobes(weights, &pair, &third).sample(&self.frame, &pair)
     }
 
     /// The share of the light that it reflects, at most, by channel: facets reflect all of it at most.
     pub(super) fn albedo(&self) -> DVec3 {
         self.diffuse + self.lobes.iter().map(|lobe| lobe.color).sum::<DVec3>()
-    }
-
-    /// The share that it does reflect of light that arrives at `cos_o`.
-    pub(super) fn reflected(&self, cos_o: f64) -> DVec3 {
-        mean_weight(self.normal, cos_o, |wo, u| self.sample(wo, u).weight)
-    }
-
-    /// The largest of these, from normal to grazing incidence.
-    pub(super) fn most_reflected(&self) -> f64 {
-        let cosines = [1.0, 0.7, 0.4, 0.2, 0.1, 0.05, 0.02];
-        let shares = cosines.map(|cosine| self.reflected(cosine).max_element());
-        shares.into_iter().fold(0.0, f64::max)
     }
 }

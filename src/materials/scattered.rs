@@ -37,15 +37,20 @@ pub(super) fn most_scattered(material: &dyn Bsdf, axis: DVec3) -> DVec3 {
 }
 
 fn mean_weight(material: &dyn Bsdf, surface: &Surface, wo: DVec3) -> DVec3 {
+    mean_over(|u| material.sample(surface, wo, u).weight)
+}
+
+/// The mean of what depends on uniform numbers, of which a material uses three.
+pub(super) fn mean_over(value: impl Fn([f64; 4]) -> DVec3) -> DVec3 {
     // Powers of the inverse of the root of x^4 = x + 1.
     const STEP: [f64; 3] = [
         0.819_172_513_396_164_4,
         0.671_043_606_703_789_2,
         0.549_700_477_901_970_3,
     ];
-    let weights = (0..POINTS).map(|i| {
+    let values = (0..POINTS).map(|i| {
         let [x, y, z] = STEP.map(|step| (0.5 + f64::from(i) * step).fract());
-        material.sample(surface, wo, [x, y, z, 0.5]).weight
+        value([x, y, z, 0.5])
     });
-    weights.sum::<DVec3>() / f64::from(POINTS)
+    values.sum::<DVec3>() / f64::from(POINTS)
 }

@@ -66,6 +66,11 @@ pub const GALLERY: &[Builtin] = &[
         text: include_str!("../../scenes/nylon.toml"),
     },
     Builtin {
+        name: "car-paint",
+        description: "car paint as measured, and with flakes of metal under a clear coat",
+        text: include_str!("../../scenes/car-paint.toml"),
+    },
+    Builtin {
         name: "frosted-glass",
         description: "frosted and tinted glass balls on a table, one around a lamp",
         text: include_str!("../../scenes/frosted-glass.toml"),

@@ -86,7 +86,7 @@ pub const LOOPS: [Loop; 10] = [
     // Over the cells that may hold the flake of a point: at most three along each axis.
     Loop {
         function: "flake_at",
-        used: has_flakes,
+        used: Effects::has_flakes,
         at_vertex: |_, effects| {
             // By `sample`, with the lecture's integrator by `share` and `evaluate`; and for a light.
             let lecture = usize::from(effects.has(Effect::Lecture));
@@ -110,11 +110,6 @@ pub const LOOPS: [Loop; 10] = [
         at_vertex: |placement, _| placement.lights.table.len().max(1) + 1,
     },
 ];
-
-fn has_flakes(effects: &Effects) -> bool {
-    let flaked = ["car_paint_flakes", "car_paint_coated_flakes"];
-    effects.forms().any(|(_, form)| flaked.contains(&form.name))
-}
 
 /// Rays that are traced at a vertex: with light sampling also one to a light.
 fn rays(effects: &Effects) -> usize {

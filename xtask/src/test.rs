@@ -29,8 +29,9 @@ const LONG_FORMS: &str = "GPU_TRACE_TEST_ALL";
 /// studies, to which a GPU is one like another; and those of light transport, whose formulas are asked
 /// on every driver by the others, one by one (`functions`, `materials`, `check`) and in whole images
 /// (`agreement`, `hazards`). All other files of `tests/` run on every driver.
-const ONCE: [&str; 31] = [
+const ONCE: [&str; 32] = [
     "albedo_variance",
+    "car_paint",
     "claims",
     "cli",
     "cli_commands",

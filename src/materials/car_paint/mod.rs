@@ -6,7 +6,9 @@ use serde::Deserialize;
 
 use super::coat::{Clearcoat, Coat, lost_below};
 use super::flakes::Flakes;
-use super::paint::{Lobe, Paint, mean};
+use super::ggx::Frame;
+use super::paint::{Lobe, Paint};
+use super::scattered::most_scattered;
 use super::uniform::cosine_moment;
 use super::{Bsdf, BsdfSample, BsdfValue, Form, MemberValue, Mistake, Surface, Value, schema};
 
@@ -109,7 +111,7 @@ const BLACK: Base = Base {
 fn flaked(paint: &Paint, flakes: &Flakes, normal: DVec3) -> Paint {
     let mut paint = *paint;
     paint.lobes[2].color = 4.0 * flakes.color;
-    paint.third_normal = normal;
+    paint.third_frame = Some(Frame::around(normal));
     paint
 }
 
@@ -127,6 +129,31 @@ impl CarPaint {
         }
     }
 
+    /// The colour of the third lobe; a coat has taken its place.
+    fn third(&self) -> DVec3 {
+        match self.clearcoat {
+            Some(_) => DVec3::ZERO,
+            None => self.base().specular[2],
+        }
+    }
+
+    /// The same paint with that third lobe, without coat and flakes.
+    fn bare(&self, third: DVec3) -> Self {
+        let Base {
+            diffuse,
+            specular: [first, second, _],
+            f0,
+            m,
+        } = self.base();
+        Self {
+            diffuse: Some(diffuse),
+            specular: Some([first, second, third]),
+            f0: Some(f0),
+            m: Some(m),
+            ..Self::default()
+        }
+    }
+
     fn paint(&self, normal: DVec3) -> Paint {
         let Base {
             diffuse,
@@ -135,15 +162,11 @@ impl CarPaint {
             m,
         } = self.base();
         Paint {
-            normal,
-            third_normal: normal,
+            frame: Frame::around(normal),
+            third_frame: None,
             diffuse,
             lobes: [0, 1, 2].map(|k| Lobe {
-                // A coat has taken the place of the third.
-                color: match (k, self.clearcoat) {
-                    (2, Some(_)) => DVec3::ZERO,
-                    _ => 4.0 * specular[k],
-                },
+                color: 4.0 * if k == 2 { self.third() } else { specular[k] },
                 f0: f0[k],
                 m: m[k],
             }),
@@ -165,8 +188,8 @@ impl CarPaint {
     }
 }
 
-/// What quadrature makes of a material that reflects all light is within that of 1.
-const ENERGY_SLACK: f64 = 5.0e-3;
+/// A paint that reflects this much more than everything is said to gain energy: what the figure is known to.
+const ENERGY_SLACK: f64 = 0.01;
 
 impl Bsdf for CarPaint {
     fn form(&self) -> &'static Form {
@@ -237,7 +260,7 @@ impl Bsdf for CarPaint {
     fn albedo(&self) -> DVec3 {
         let paint = self.paint(DVec3::Z);
         let flake = self.flakes.map_or(DVec3::ZERO, |flakes| {
-            let lobe = flaked(&paint, &flakes, paint.normal);
+            let lobe = flaked(&paint, &flakes, paint.frame.normal());
             let third = lobe.lobes[2];
             lobe.albedo() + (4.0 * (1.0 + third.m * third.m).sqrt() - 1.0) * third.color
         });
@@ -249,21 +272,30 @@ impl Bsdf for CarPaint {
     }
 
     // Of a lobe the weight under uniform directions is up to 2 ks D/cos_o: its square has a mean that grows
-    // with -log(cos_o), and higher powers faster. Over diffuse paint alone, a coat's delta lobe has the weight
-    // kept <= 1, and the rest up to 1/a times that of the paint, a being what the paint reflects in the mean of
-    // the channels: the mean of both is at most the larger.
+    // with -log(cos_o), and higher powers faster. Where a channel has none, with F and t = 1 - F of a coat over parts p,
+    // the diffuse one being d: the delta lobe has at most the weight F + t sum max(p), max being over channels, and the
+    // rest at most 2 cos_i d (t + F (F + t max(d))/(max(d) (F + t min(d)))), in which the last quotient is at most
+    // 1 + t (max(d) - min(d))/F: that is linear in F. The mean of both is at most the larger.
     fn moment(&self, channel: usize, k: i32) -> f64 {
         let paint = self.paint(DVec3::Z);
         let flakes = self.flakes.is_some_and(|flakes| flakes.color[channel] > 0.0);
         let glossy = flakes || paint.lobes.iter().any(|lobe| lobe.color[channel] > 0.0);
         let diffuse = paint.diffuse[channel];
-        let a = mean(paint.diffuse);
         match (glossy, k, self.clearcoat) {
             (_, ..=1, _) => self.albedo()[channel].powi(k),
             (true, ..) => f64::INFINITY,
             (_, _, None) => cosine_moment(k) * diffuse.powi(k),
-            (_, _, Some(_)) if diffuse == 0.0 => 1.0,
-            (_, _, Some(_)) => (cosine_moment(k) * (diffuse / a).powi(k)).max(1.0),
+            (_, _, Some(_)) => {
+                let (least, most) = (paint.diffuse.min_element(), paint.diffuse.max_element());
+                let over = match diffuse {
+                    0.0 => 0.0,
+                    diffuse => diffuse * f64::max(1.0 / most, 2.0 - least / most),
+                };
+                let lobes = paint.lobes.iter().map(|lobe| lobe.color.max_element());
+                let flake = self.flakes.map_or(0.0, |flakes| 4.0 * flakes.color.max_element());
+                let coat = f64::max(1.0, most + lobes.sum::<f64>() + flake);
+                f64::max(coat.powi(k), cosine_moment(k) * over.powi(k))
+            }
         }
     }
 
@@ -272,7 +304,7 @@ impl Bsdf for CarPaint {
         let u = [u[0], u[1], u[2]];
         match self.coat(&paint, surface, wo) {
             Some(coat) => coat.sample(&paint, wo, u),
-            None => paint.sample(wo, u),
+            None => paint.sample(&paint.weights(wo), wo, u),
         }
     }
 
@@ -285,15 +317,15 @@ impl Bsdf for CarPaint {
         let paint = self.paint_at(surface);
         match self.coat(&paint, surface, wo) {
             Some(coat) => coat.evaluate(&paint, wo, wi),
-            None => paint.evaluate(wo, wi),
+            None => paint.evaluate(&paint.weights(wo), wo, wi),
         }
     }
 
     fn warning(&self) -> Option<[String; 2]> {
-        let paint = self.paint(DVec3::Z);
-        let on_flake = self.flakes.map(|flakes| flaked(&paint, &flakes, paint.normal));
-        let most = on_flake.map_or(0.0, |paint| paint.most_reflected());
-        let most = paint.most_reflected().max(most);
+        let bare = self.bare(self.third());
+        let on_flake = self.flakes.map(|flakes| self.bare(flakes.color));
+        let most = |paint: &Self| most_scattered(paint, DVec3::Y).max_element();
+        let most = on_flake.as_ref().map_or(0.0, most).max(most(&bare));
         let mut said: Vec<[String; 2]> = Vec::new();
         if most > 1.0 + ENERGY_SLACK {
             said.push([
@@ -304,7 +336,7 @@ impl Bsdf for CarPaint {
             ]);
         }
         if let Some(Clearcoat { ior }) = self.clearcoat {
-            let lost = 100.0 * lost_below(&paint, ior);
+            let lost = 100.0 * lost_below(&self.paint(DVec3::Z), ior);
             said.push([
                 format!(
                     "loses energy by design: no light goes between coat and paint, {lost:.1} % of what arrives \
