@@ -119,26 +119,24 @@ impl TextureImage {
     /// The shortest rotation that takes the axis to +y; of -y half a turn about +x.
     #[must_use]
     pub fn rotation(&self) -> DMat3 {
-        let (axis, cosine) = (self.axis, self.axis.y);
-        let v = axis.cross(DVec3::Y);
-        let square = v.length_squared();
-        if square == 0.0 {
-            return DMat3::from_diagonal(match cosine > 0.0 {
+        let across = self.axis.cross(DVec3::Y);
+        let sine = across.length();
+        let size = across.abs().max_element();
+        // Its square may be no f64.
+        let Some(k) = (across / size).try_normalize() else {
+            return DMat3::from_diagonal(match self.axis.y > 0.0 {
                 true => DVec3::ONE,
                 false => DVec3::new(1.0, -1.0, -1.0),
             });
-        }
-        // Rodrigues: I + [v] + [v]^2/(1 + c), whose denominator is the square over 1 - c.
-        let cross = DMat3::from_cols(
-            DVec3::new(0.0, v.z, -v.y),
-            DVec3::new(-v.z, 0.0, v.x),
-            DVec3::new(v.y, -v.x, 0.0),
-        );
-        let over = match cosine > 0.0 {
-            true => 1.0 / (1.0 + cosine),
-            false => (1.0 - cosine) / square,
         };
-        DMat3::IDENTITY + cross + over * (cross * cross)
+        // Rodrigues: c I + s [k] + (1 - c) k k^T.
+        let cross = DMat3::from_cols(
+            DVec3::new(0.0, k.z, -k.y),
+            DVec3::new(-k.z, 0.0, k.x),
+            DVec3::new(k.y, -k.x, 0.0),
+        );
+        let along = DMat3::from_cols(k.x * k, k.y * k, k.z * k);
+        self.axis.y * DMat3::IDENTITY + sine * cross + (1.0 - self.axis.y) * along
     }
 }
 

@@ -17,7 +17,7 @@ fn exr_of(picture: &Picture) -> Vec<u8> {
     exr::encode(picture, &[], &Metadata::new()).expect("an EXR file")
 }
 
-/// A scene whose white material, in line 11 with its albedo in line 13, has another line there.
+/// A scene whose white material, in line 12 with its albedo in line 14, has another line there.
 fn scene_of(albedo: &str) -> String {
     GOOD.replace("albedo = [0.9, 0.8, 0.7]", albedo)
 }
@@ -169,9 +169,9 @@ fn what_is_no_texture_is_refused() {
         ("albedo = { image = \"b.exr\" }".into(), &["cannot read", "b.exr"]),
         ("albedo = { image = \".\" }".into(), &["is no regular file"]),
     ] {
-        refused(&folder, &albedo, 13, says);
+        refused(&folder, &albedo, 14, says);
     }
-    refused(&folder, "albedo = { image = \"a.exr\" }\naxis = [0, 0, 0]", 14, &["`axis` has no direction"]);
+    refused(&folder, "albedo = { image = \"a.exr\" }\naxis = [0, 0, 0]", 15, &["`axis` has no direction"]);
     // Keys that are no colours and no roughness.
     let text = GOOD.replace("ior = 1.5", "ior = { checker = [1.5, 1.6] }");
     let error = load_str_in("scene", &text, Path::new("")).expect_err("an index is none");
@@ -185,7 +185,7 @@ fn texels_are_within_the_limits_of_their_key() {
     picture.pixels[2 * 6 + 3][1] = 1.5;
     folder.write("a.exr", exr_of(&picture));
     let albedo = "albedo = { image = \"a.exr\" }";
-    refused(&folder, albedo, 13, &["a.exr: its texel in column 3 of row 2 is [", "1.5", "outside of [0, 1], the limits of `albedo`"]);
+    refused(&folder, albedo, 14, &["a.exr: its texel in column 3 of row 2 is [", "1.5", "outside of [0, 1], the limits of `albedo`"]);
     // What emits may be brighter, and a number reads the red channel alone.
     texture(&folder, "albedo = [0, 0, 0]\nemission = { image = \"a.exr\" }");
     let rough = |kind: &str| {
@@ -200,11 +200,11 @@ fn texels_are_within_the_limits_of_their_key() {
     folder.write("a.exr", exr_of(&picture));
     let error = rough(cloth).expect_err("below the least").to_string();
     assert!(error.contains("its red value in column 3 of row 1 is 0.04, outside of [0.05, 1]"), "{error}");
-    assert!(error.contains("scene:14:"), "{error}");
+    assert!(error.contains("scene:15:"), "{error}");
     for (value, shown) in [(f32::NAN, "NaN"), (f32::INFINITY, "inf"), (-0.5, "-0.5")] {
         picture.pixels[9] = [0.5, value, 0.5];
         folder.write("a.exr", exr_of(&picture));
-        refused(&folder, albedo, 13, &["its texel in column 3 of row 1 is", shown]);
+        refused(&folder, albedo, 14, &["its texel in column 3 of row 1 is", shown]);
     }
 }
 
@@ -213,7 +213,7 @@ fn wrong_scenes_exit_with_2_and_images_go_with_film_files() {
     let folder = Folder::new();
     folder.write("bad.toml", scene_of("albedo = { image = \"none.png\" }"));
     let says = folder.refused(&["scene", "check", "bad.toml"]);
-    assert!(says.contains("bad.toml:13:") && says.contains("none.png"), "{says}");
+    assert!(says.contains("bad.toml:14:") && says.contains("none.png"), "{says}");
     #[cfg(unix)]
     {
         folder.write("device.toml", scene_of("albedo = { image = \"/dev/zero\" }"));
