@@ -7,11 +7,12 @@
 //! for every narrow lobe.
 
 use glam::{DVec2, DVec3};
+use gpu_trace::materials::car_paint::CarPaint;
 use gpu_trace::materials::{ALL, MaterialKind, Surface, luminance};
 use gpu_trace::reference::core::sampling::{basis_around, cosine_direction};
 use gpu_trace::statistics::mean_and_error;
-use gpu_trace::verify::bsdf::draw::OFFSETS;
 use gpu_trace::verify::Random;
+use gpu_trace::verify::bsdf::draw::OFFSETS;
 
 /// Those whose sampling is no closed matter.
 const MATERIALS: &[&str] = &["ashikhmin", "disney", "sheen", "nylon", "car-paint"];
@@ -49,14 +50,20 @@ fn ratios(mut weight: impl FnMut(&mut Random) -> DVec3, name: &str) -> Ratios {
     ]
 }
 
-/// Where a material is looked at: one that looks at the offset on a flake and beside.
-fn places(kind: &MaterialKind) -> &'static [(&'static str, DVec3)] {
-    const ON: (&str, DVec3) = (", on a flake", OFFSETS[0]);
-    const BESIDE: (&str, DVec3) = (", beside", OFFSETS[1]);
-    match kind.form().offset {
-        true => &[ON, BESIDE],
-        false => &[("", DVec3::ZERO)],
-    }
+/// Where a material is looked at: one that looks at the offset at several, of which a flake has some.
+fn places(kind: &MaterialKind) -> Vec<(&'static str, DVec3)> {
+    let MaterialKind::CarPaint(CarPaint {
+        flakes: Some(flakes),
+        ..
+    }) = kind
+    else {
+        return vec![("", DVec3::ZERO)];
+    };
+    let named = |offset| match flakes.normal_at(&place(offset).0) {
+        Some(_) => (", on a flake", offset),
+        None => (", beside", offset),
+    };
+    OFFSETS.map(named).into()
 }
 
 /// At 45 degrees, about a normal along no axis.
@@ -116,8 +123,8 @@ fn sampling_leaves_little() {
         let cases = (material.cases)();
         let places = (1..).zip(&cases).flat_map(|(i, kind)| {
             places(kind)
-                .iter()
-                .map(move |(at, offset)| (format!("{i}{at}"), kind, *offset))
+                .into_iter()
+                .map(move |(at, offset)| (format!("{i}{at}"), kind, offset))
         });
         for (case, kind, offset) in places {
             let (own, cosine) = (by_its_own(kind, offset), by_the_cosine(kind, offset));

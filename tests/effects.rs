@@ -165,7 +165,14 @@ fn textured(set: &Set, kinds: &[MaterialKind]) -> Vec<Material> {
         let size = 0.5;
         for (effect, texture) in [
             (Effect::TextureChecker, Texture::Checker { values, size }),
-            (Effect::TextureNoise, Texture::Noise { values, size, octaves: 2 }),
+            (
+                Effect::TextureNoise,
+                Texture::Noise {
+                    values,
+                    size,
+                    octaves: 2,
+                },
+            ),
             (Effect::TextureImage, Texture::Image(image)),
         ] {
             if set.contains(&effect) {

@@ -9,6 +9,7 @@ use gpu_trace::effects::Effects;
 use gpu_trace::gpu::probe::Probe;
 use gpu_trace::materials::flakes::Flakes;
 use gpu_trace::materials::flakes::{flake_at, flake_normal, flake_words};
+use gpu_trace::materials::ggx::Frame;
 use gpu_trace::materials::lattice::LatticePoint;
 use gpu_trace::placement::Placement;
 use gpu_trace::scene::Scene;
@@ -102,6 +103,12 @@ fn flakes_are_as_many_as_density_says() {
     assert_eq!(missed, 0);
 }
 
+/// The normal of a cell's flake where the surface has this one.
+fn normal_about(normal: DVec3, cell: [u32; 3], spread: f64) -> DVec3 {
+    let frame = Frame::around(normal);
+    frame.to_world(flake_normal(cell, spread, &frame))
+}
+
 /// p-values of flakes' slopes, as large as in a distribution of width `spread`, and of their turns about the normal.
 fn slopes(spread: f64, assumed: f64) -> [f64; 2] {
     let mut random = Random::new("slopes of flakes");
@@ -111,7 +118,7 @@ fn slopes(spread: f64, assumed: f64) -> [f64; 2] {
     let (mut sizes, mut turns) = (Vec::new(), Vec::new());
     for _ in 0..40_000 {
         let [x, y, z, _] = random.words();
-        let n = flake_normal([x, y, z], spread, normal);
+        let n = normal_about(normal, [x, y, z], spread);
         let slope = n / n.dot(normal) - normal;
         // Beckmann: exp(-slope^2/spread^2) is uniform.
         sizes.push((-slope.length_squared() / (assumed * assumed)).exp());
@@ -128,7 +135,7 @@ fn normals_have_the_stated_spread() {
         // Companion: 3 % wider.
         assert!(slopes(spread, 1.03 * spread)[0] < 1.0e-4);
     }
-    assert_eq!(flake_normal([1, 2, 3], 0.0, DVec3::Z), DVec3::Z);
+    assert_eq!(normal_about(DVec3::Z, [1, 2, 3], 0.0), DVec3::Z);
 }
 
 /// A ball, one that is moved far away, and walls about their poles, all of the same paint.
@@ -252,7 +259,7 @@ fn compare(scene: &Scene, geometry: GeometryChoice, anchor: fn(DVec3) -> DVec3) 
             let apart = (apart - apart.round()).length() / (flakes.scale * error);
             found.place = found.place.max(apart);
             if let Some(cell) = truth {
-                let twin = flake_normal(cell, flakes.spread, vector(*normal));
+                let twin = normal_about(vector(*normal), cell, flakes.spread);
                 let apart = (vector(tilted.map(f32::from_bits)) - twin).length();
                 found.normal = found.normal.max(apart);
             }

@@ -120,8 +120,13 @@ impl BsdfProbe {
     /// # Errors
     /// If the device fails.
     pub fn new(gpu: &Gpu, materials: &[MaterialKind], integrator: Integrator) -> Result<Self> {
-        let named = |(i, kind): (usize, &MaterialKind)| Material::new(&format!("m{i}"), kind.clone());
-        Self::of(gpu, materials.iter().enumerate().map(named).collect(), integrator)
+        let named =
+            |(i, kind): (usize, &MaterialKind)| Material::new(&format!("m{i}"), kind.clone());
+        Self::of(
+            gpu,
+            materials.iter().enumerate().map(named).collect(),
+            integrator,
+        )
     }
 
     /// The same of materials that may have textures, which are looked up where a question is.

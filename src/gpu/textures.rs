@@ -105,9 +105,7 @@ impl TextureTable {
     /// Adds a texture whose values are multiplied by `unit`.
     fn number(&mut self, texture: &Texture, anchor: DVec3, unit: f64) -> u32 {
         let (kind, place) = match texture {
-            Texture::Checker { values, size } => {
-                (1, self.pattern(*values, *size, 0, anchor, unit))
-            }
+            Texture::Checker { values, size } => (1, self.pattern(*values, *size, 0, anchor, unit)),
             Texture::Noise {
                 values,
                 size,
@@ -203,7 +201,10 @@ impl TextureTable {
     /// The texels of that texture.
     #[must_use]
     pub fn texels(&self) -> Vec<[f32; 4]> {
-        let all = self.pictures.iter().flat_map(|(picture, _)| &picture.pixels);
+        let all = self
+            .pictures
+            .iter()
+            .flat_map(|(picture, _)| &picture.pixels);
         let mut texels: Vec<[f32; 4]> = all.map(|[r, g, b]| [*r, *g, *b, 0.0]).collect();
         texels.resize((self.rows() * u64::from(IMAGE_WIDTH)) as usize, [0.0; 4]);
         texels

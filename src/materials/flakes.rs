@@ -5,6 +5,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::beckmann::beckmann_slope2;
+use super::ggx::Frame;
 use super::lattice::{LatticePoint, anchor_members};
 use super::schema::{self, MAX_MAGNITUDE};
 use super::{Form, Member, MemberValue, Surface, Value};
@@ -24,7 +25,9 @@ pub(super) const FLAKE_MEMBERS: [Member; 5] = [
 
 /// Whether a form has them.
 pub(crate) fn are_in(form: &Form) -> bool {
-    FLAKE_MEMBERS.iter().all(|member| form.members.contains(member))
+    FLAKE_MEMBERS
+        .iter()
+        .all(|member| form.members.contains(member))
 }
 
 /// And where poles are in their lattice.
@@ -58,9 +61,15 @@ impl Flakes {
     /// The normal of the flake at `surface`, if there is one.
     #[must_use]
     pub fn normal_at(&self, surface: &Surface) -> Option<DVec3> {
+        let frame = Frame::around(surface.normal);
+        Some(frame.to_world(self.normal_within(surface, &frame)?))
+    }
+
+    /// The same in the surface's frame.
+    pub(super) fn normal_within(&self, surface: &Surface, frame: &Frame) -> Option<DVec3> {
         let point = LatticePoint::of(surface.offset, self.scale);
         let cell = flake_at(&point, self.density, self.jitter)?;
-        Some(flake_normal(cell, self.spread, surface.normal))
+        Some(flake_normal(cell, self.spread, frame))
     }
 
     /// The values of [`FLAKE_MEMBERS`].
@@ -126,11 +135,11 @@ pub fn flake_at(point: &LatticePoint, density: f64, jitter: f64) -> Option<[u32;
     found
 }
 
-/// The normal of the flake of a cell where the surface has this one.
+/// The normal of the flake of a cell, in the surface's frame.
 #[must_use]
-pub fn flake_normal(cell: [u32; 3], spread: f64, normal: DVec3) -> DVec3 {
+pub fn flake_normal(cell: [u32; 3], spread: f64, frame: &Frame) -> DVec3 {
     let [a, b, c, d] = unit_float(flake_words(cell, 1));
     let across: DVec2 = beckmann_slope2(a).sqrt() * circle_point(b);
     let tilt = spread * across.extend(beckmann_slope2(c).sqrt() * circle_point(d).x);
-    (normal + tilt - tilt.dot(normal) * normal).normalize()
+    frame.to_local(tilt).with_z(1.0).normalize()
 }

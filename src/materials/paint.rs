@@ -27,8 +27,8 @@ pub(super) struct Paint {
     pub(super) frame: Frame,
     pub(super) diffuse: DVec3,
     pub(super) lobes: [Lobe; 3],
-    /// About the normal of the third lobe, where a flake turns it.
-    pub(super) third_frame: Option<Frame>,
+    /// About the normal of the third lobe, which a flake turns, within `frame`.
+    pub(super) third_frame: Frame,
 }
 
 /// In proportion to what parts are chosen: the diffuse one, and the lobes.
@@ -65,13 +65,12 @@ pub(super) fn choosable(weights: [f64; 4]) -> [f64; 4] {
     }
 }
 
-/// A pair from one frame in another, where wo is `o`.
-fn turned(pair: &Pair, o: DVec3, from: &Frame, to: &Frame) -> Pair {
-    let turn = |w: DVec3| to.to_local(from.to_world(w));
+/// A pair in a frame that is given in its own one.
+fn within(pair: &Pair, frame: &Frame) -> Pair {
     Pair {
-        o,
-        i: turn(pair.i),
-        h: turn(pair.h),
+        o: frame.to_local(pair.o),
+        i: frame.to_local(pair.i),
+        h: frame.to_local(pair.h),
         ..*pair
     }
 }
@@ -92,10 +91,9 @@ impl Lobe {
 impl Paint {
     /// What each part reflects, about: the diffuse one, and the lobes.
     pub(super) fn parts(&self, wo: DVec3) -> [DVec3; 4] {
-        let cos_o = self.frame.normal().dot(wo).clamp(0.0, 1.0);
-        let cos_third = self
-            .third_frame
-            .map_or(cos_o, |frame| frame.normal().dot(wo).min(1.0));
+        let o = arrival(&self.frame, wo);
+        let cos_o = o.z.min(1.0);
+        let cos_third = o.dot(self.third_frame.normal()).min(1.0);
         let [first, second, third] = self.lobes;
         let of_third = match cos_third >= 0.0 {
             true => third.reflectance(cos_third) * third.color,
@@ -134,9 +132,7 @@ impl Paint {
 
     pub(super) fn evaluate(&self, weights: &[f64; 4], wo: DVec3, wi: DVec3) -> BsdfValue {
         let pair = Pair::between(arrival(&self.frame, wo), self.frame.to_local(wi));
-        let third = self.third_frame.map_or(pair, |frame| {
-            Pair::between(frame.to_local(wo), frame.to_local(wi))
-        });
+        let third = within(&pair, &self.third_frame);
         self.lobes(weights, &pair, &third).value(&pair)
     }
 
@@ -144,27 +140,29 @@ impl Paint {
         let (o, plane) = (arrival(&self.frame, wo), DVec2::new(u[0], u[1]));
         let [diffuse, lobes @ ..] = weights;
         let mut place = u[2] * weights.iter().sum::<f64>() - diffuse;
-        let third_frame = self.third_frame.unwrap_or(self.frame);
-        let a = self.third_frame.map_or(o, |frame| frame.to_local(wo));
-        if place < 0.0 {
-            let pair = Pair::between(o, cosine_direction(DVec3::Z, plane));
-            let third = turned(&pair, a, &self.frame, &third_frame);
-            return self.lobes(weights, &pair, &third).sample(&self.frame, &pair);
-        }
         let mut chosen = 0;
         while chosen < 2 && place >= lobes[chosen] {
             place -= lobes[chosen];
             chosen += 1;
         }
-        let normal = |o| beckmann_normal(o, self.lobes[chosen].m, plane, place / lobes[chosen]);
-        let (pair, third) = if chosen == 2 {
-            let third = Pair::about(a, normal(a));
-            (turned(&third, o, &third_frame, &self.frame), third)
-        } else {
-            let pair = Pair::about(o, normal(o));
-            (pair, turned(&pair, a, &self.frame, &third_frame))
+        let about = |o| {
+            let (m, v) = (self.lobes[chosen].m, place / lobes[chosen]);
+            Pair::about(o, beckmann_normal(o, m, plane, v))
         };
-        self.lobes(weights, &pair, &third).sample(&self.frame, &pair)
+        let turned = &self.third_frame;
+        let (pair, third) = if place >= 0.0 && chosen == 2 {
+            let third = about(turned.to_local(o));
+            let [i, h] = [third.i, third.h].map(|w| turned.to_world(w));
+            (Pair { o, i, h, ..third }, third)
+        } else {
+            let pair = match place >= 0.0 {
+                true => about(o),
+                false => Pair::between(o, cosine_direction(DVec3::Z, plane)),
+            };
+            (pair, within(&pair, turned))
+        };
+        self.lobes(weights, &pair, &third)
+            .sample(&self.frame, &pair)
     }
 
     /// The share of the light that it reflects, at most, by channel: facets reflect all of it at most.

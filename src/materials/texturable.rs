@@ -133,10 +133,12 @@ pub fn flag(key: &str) -> &'static str {
 
 /// The members with the numbers among these parameters.
 pub fn key_values(parameters: Vec<(&'static str, Value)>) -> impl Iterator<Item = (Member, f64)> {
-    parameters.into_iter().filter_map(|(key, value)| match value {
-        Value::Number(number) => Some((key_member(key), number)),
-        _ => None,
-    })
+    parameters
+        .into_iter()
+        .filter_map(|(key, value)| match value {
+            Value::Number(number) => Some((key_member(key), number)),
+            _ => None,
+        })
 }
 
 /// `what_key`.
@@ -149,7 +151,9 @@ fn kept(text: &str) -> &'static str {
     use std::collections::BTreeSet;
     use std::sync::Mutex;
     static ALL: Mutex<BTreeSet<&'static str>> = Mutex::new(BTreeSet::new());
-    let mut all = ALL.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+    let mut all = ALL
+        .lock()
+        .unwrap_or_else(std::sync::PoisonError::into_inner);
     if let Some(known) = all.get(text) {
         return known;
     }

@@ -52,9 +52,7 @@ impl<'de> Deserializer<'de> for Value {
     fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Error> {
         match self {
             Self::Number(number) => visitor.visit_f64(number),
-            Self::Vector(v) => {
-                visitor.visit_seq(SeqDeserializer::new(v.to_array().into_iter()))
-            }
+            Self::Vector(v) => visitor.visit_seq(SeqDeserializer::new(v.to_array().into_iter())),
             Self::Pair(v) => visitor.visit_seq(SeqDeserializer::new(v.to_array().into_iter())),
             Self::Vectors(all) => {
                 visitor.visit_seq(SeqDeserializer::new(all.into_iter().map(Self::Vector)))

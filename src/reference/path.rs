@@ -453,7 +453,9 @@ impl PathTracer<'_> {
         } else {
             // Where f32 or a rounding lets the ray miss the limb, it is there.
             let met = Hit {
-                t: first.filter(|first| first.index == s.sphere).map_or(s.limb, |first| first.t),
+                t: first
+                    .filter(|first| first.index == s.sphere)
+                    .map_or(s.limb, |first| first.t),
                 index: s.sphere,
                 inside: false,
             };

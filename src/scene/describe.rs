@@ -79,7 +79,10 @@ fn textures(text: &mut String, scene: &Scene) -> fmt::Result {
         let what = match texture {
             Texture::Checker { size, .. } => format!("a checker of cells of {size}"),
             Texture::Noise { size, octaves, .. } => {
-                format!("a noise of cells of {size}, {}", counted(u64::from(*octaves), "octave"))
+                format!(
+                    "a noise of cells of {size}, {}",
+                    counted(u64::from(*octaves), "octave")
+                )
             }
             Texture::Image(image) => {
                 let (picture, name) = (image.image(), image.name().escape_debug());

@@ -74,8 +74,7 @@ impl Material {
     /// The mean of what is emitted over a sphere.
     #[must_use]
     pub fn mean_emission(&self) -> DVec3 {
-        self.texture(EMISSION)
-            .map_or(self.emission, Texture::mean)
+        self.texture(EMISSION).map_or(self.emission, Texture::mean)
     }
 
     /// The forms that it has somewhere: that of `kind`, and the smooth one where its roughness is 0.

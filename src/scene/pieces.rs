@@ -38,11 +38,7 @@ pub(super) fn parse(text: &str, schema: &serde_json::Value) -> Option<Parts> {
     parse_by(SPHERES, text, schema)
 }
 
-fn parse_by(
-    spheres: usize,
-    text: &str,
-    schema: &serde_json::Value,
-) -> Option<Parts> {
+fn parse_by(spheres: usize, text: &str, schema: &serde_json::Value) -> Option<Parts> {
     let starts = starts(text)?;
     let mut head = DeTable::parse(&text[..*starts.first()?]).ok()?;
     if head.get_ref().contains_key("sphere") {

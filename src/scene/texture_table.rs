@@ -189,13 +189,29 @@ fn check_keys(table: &TextureTable, place: &Place<'_>, report: &mut Report) -> b
     }
     let patterns = ["checker", "noise"];
     let further = [
-        ("linear", table.linear.as_ref().map(Spanned::span), &["image"][..]),
-        ("size", table.size.as_ref().map(Spanned::span), &patterns[..]),
-        ("octaves", table.octaves.as_ref().map(Spanned::span), &["noise"][..]),
+        (
+            "linear",
+            table.linear.as_ref().map(Spanned::span),
+            &["image"][..],
+        ),
+        (
+            "size",
+            table.size.as_ref().map(Spanned::span),
+            &patterns[..],
+        ),
+        (
+            "octaves",
+            table.octaves.as_ref().map(Spanned::span),
+            &["noise"][..],
+        ),
     ];
     for (key, at, of) in further {
         if let Some(at) = at.filter(|_| !of.contains(&first)) {
-            let message = format!("`{key}` needs {} in {}", list(of.iter().copied(), "or"), place.name());
+            let message = format!(
+                "`{key}` needs {} in {}",
+                list(of.iter().copied(), "or"),
+                place.name()
+            );
             let problem = Problem::new(at, message, "").also(span.clone(), "there is another kind");
             report.errors.push(problem.help(format!("remove `{key}`")));
         }
@@ -225,17 +241,26 @@ fn texture(
         return Some(Texture::Noise {
             values: values(pair),
             size,
-            octaves: table.octaves.as_ref().map_or(4, |octaves| *octaves.get_ref()),
+            octaves: table
+                .octaves
+                .as_ref()
+                .map_or(4, |octaves| *octaves.get_ref()),
         });
     }
     let file = table.image.as_ref()?;
-    let linear = table.linear.as_ref().is_some_and(|linear| *linear.get_ref());
+    let linear = table
+        .linear
+        .as_ref()
+        .is_some_and(|linear| *linear.get_ref());
     // Nothing is read for a file with errors.
     if !report.errors.is_empty() {
         return None;
     }
     let mut wrong = |text: String| report.errors.push(Problem::new(file.span(), text, ""));
-    let picture = images.picture(file.get_ref(), linear).map_err(&mut wrong).ok()?;
+    let picture = images
+        .picture(file.get_ref(), linear)
+        .map_err(&mut wrong)
+        .ok()?;
     if let Some(text) = beyond(&picture, place.key) {
         let shown = file.get_ref().escape_debug();
         wrong(format!("{shown}: {text} `{}`", place.key.key));
@@ -255,11 +280,16 @@ fn beyond(picture: &Picture, key: &Texturable) -> Option<String> {
     let (column, row) = (place % picture.width, place / picture.width);
     let texel = &picture.pixels[place as usize][..channels];
     let what = match key.number {
-        true => format!("red value in column {column} of row {row} is {:?}", texel[0]),
+        true => format!(
+            "red value in column {column} of row {row} is {:?}",
+            texel[0]
+        ),
         false => format!("texel in column {column} of row {row} is {texel:?}"),
     };
     let (low, high) = (key.minimum, key.maximum);
-    Some(format!("its {what}, outside of [{low}, {high}], the limits of"))
+    Some(format!(
+        "its {what}, outside of [{low}, {high}], the limits of"
+    ))
 }
 
 /// Images of a scene, each read once.

@@ -60,7 +60,10 @@ pub(super) fn module(effects: &Effects) -> String {
         ("sample_uniform", Drawn::Uniform),
         ("sample_beside", Drawn::Beside),
     ] {
-        if forms.iter().any(|(_, form)| Drawn::of(form, lecture) == drawn) {
+        if forms
+            .iter()
+            .any(|(_, form)| Drawn::of(form, lecture) == drawn)
+        {
             let _ = writeln!(text, "import package::materials::uniform::{name};");
         }
     }

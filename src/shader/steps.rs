@@ -99,7 +99,8 @@ pub const LOOPS: [Loop; 10] = [
         used: |effects| effects.has(Effect::TextureNoise),
         at_vertex: |_, effects| {
             // Each key once, and what a light emits.
-            let lookups = effects.textured_keys().count() + usize::from(effects.has(Effect::Lights));
+            let lookups =
+                effects.textured_keys().count() + usize::from(effects.has(Effect::Lights));
             lookups * (MOST_OCTAVES as usize + 1)
         },
     },

@@ -9,7 +9,9 @@ use crate::materials::{Form, Member, Texturable};
 /// The form's keys that are textures of some material in the kernel.
 fn textured(effects: &Effects, form: &Form) -> Vec<&'static Texturable> {
     let keys: Vec<&str> = effects.textured_keys().collect();
-    form.texturable().filter(|t| keys.contains(&t.key)).collect()
+    form.texturable()
+        .filter(|t| keys.contains(&t.key))
+        .collect()
 }
 
 /// Whether what a surface's form is depends on a texture.
@@ -42,8 +44,7 @@ pub(crate) fn smooth_kind() -> Member {
 
 /// What the function `with_textures` imports.
 pub(super) fn imports(effects: &Effects) -> String {
-    let mut text =
-        String::from("import package::scene::texture::{TexturePoint, texture_value};\n");
+    let mut text = String::from("import package::scene::texture::{TexturePoint, texture_value};\n");
     let forms = effects.forms().map(|(_, form)| form);
     for form in forms.filter(|form| form.derives.is_some()) {
         if !textured(effects, form).is_empty() {
@@ -92,12 +93,21 @@ fn of_form(form: &Form, keys: &[&Texturable]) -> String {
         let (name, number) = (key.key, texture_member(key.key).name);
         let member = form.textured_member(key).name;
         let channel = if key.number { ".x" } else { "" };
-        let _ = writeln!(text, "if own.{number} != 0u {{ own.{member} = of_{name}{channel}; }}");
+        let _ = writeln!(
+            text,
+            "if own.{number} != 0u {{ own.{member} = of_{name}{channel}; }}"
+        );
     }
     if form.derives.is_some() {
-        let numbers = keys.iter().map(|key| format!("own.{}", texture_member(key.key).name));
+        let numbers = keys
+            .iter()
+            .map(|key| format!("own.{}", texture_member(key.key).name));
         let any = numbers.collect::<Vec<_>>().join(" | ");
-        let _ = writeln!(text, "if ({any}) != 0u {{ own = derive_{}(own); }}", form.name);
+        let _ = writeln!(
+            text,
+            "if ({any}) != 0u {{ own = derive_{}(own); }}",
+            form.name
+        );
     }
     if keys.iter().any(|key| key.key == ROUGHNESS) {
         let (number, value) = (texture_member(ROUGHNESS).name, key_member(ROUGHNESS).name);

@@ -39,29 +39,46 @@ fn off(a: &Film, b: &Film) -> f64 {
 fn constant_textures_are_plain_colours() {
     // Other spheres see it, and lamps light it.
     let base = scene_file("scenes/tests/lamps.toml");
-    let place = base.materials.iter().position(|m| m.kind.name() == "diffuse" && m.emission == DVec3::ZERO);
+    let place = base
+        .materials
+        .iter()
+        .position(|m| m.kind.name() == "diffuse" && m.emission == DVec3::ZERO);
     let place = place.expect("a diffuse material");
     let color = base.materials[place].kind.color().as_vec3();
     let textured = |texture: Texture| {
         let mut scene = base.clone();
-        scene.materials[place] = scene.materials[place].clone().with_texture(albedo(), texture);
+        scene.materials[place] = scene.materials[place]
+            .clone()
+            .with_texture(albedo(), texture);
         scene
     };
     let values = [color.as_dvec3(); 2];
-    for geometry in [GeometryChoice::Baked, GeometryChoice::List, GeometryChoice::Bvh] {
+    for geometry in [
+        GeometryChoice::Baked,
+        GeometryChoice::List,
+        GeometryChoice::Bvh,
+    ] {
         let settings = Settings {
             geometry,
             ..settings(&base, 32, 24, 16)
         };
         let plain = render_gpu(&base, &settings);
         let checker = textured(Texture::Checker { values, size: 0.5 });
-        assert_eq!(image_bits(&render_gpu(&checker, &settings)), image_bits(&plain), "{geometry:?}");
+        assert_eq!(
+            image_bits(&render_gpu(&checker, &settings)),
+            image_bits(&plain),
+            "{geometry:?}"
+        );
         let picture = Picture::new(5, 3, vec![color.to_array(); 15]);
         // An interpolation has three roundings, of which there are three, at each of a few events.
         let constant = textured(image(picture, DVec3::X));
         let found = off(&render_gpu(&constant, &settings), &plain);
         assert!(found < 1.0e-5, "{geometry:?}: {found:e}");
-        let noise = textured(Texture::Noise { values, size: 0.5, octaves: 3 });
+        let noise = textured(Texture::Noise {
+            values,
+            size: 0.5,
+            octaves: 3,
+        });
         let found = off(&render_gpu(&noise, &settings), &plain);
         assert!(found < 1.0e-5, "{geometry:?}: {found:e}");
         // Companion: a hundredth brighter.
@@ -76,7 +93,10 @@ fn a_checker_in_white_light_is_its_mean() {
     // A ball alone in light of 1 shows its albedo. That of mirror images is the other value, and so the mean of what is
     // seen is the mean of both; the ball fills the image.
     let (a, b) = (DVec3::new(0.9, 0.2, 0.5), DVec3::new(0.3, 0.8, 0.1));
-    let texture = Texture::Checker { values: [a, b], size: 0.11 };
+    let texture = Texture::Checker {
+        values: [a, b],
+        size: 0.11,
+    };
     let scene = with_albedo(&ball(14.0, 1.0), texture);
     let film = render_gpu(&scene, &settings(&scene, 32, 32, 256));
     let (mean, truth) = (means(&film), 0.5 * (a + b));
@@ -84,21 +104,34 @@ fn a_checker_in_white_light_is_its_mean() {
         // Pairs of pixels that are each other's mirror image.
         let pixel = |x: usize, y: usize| mean[3 * (32 * y + x) + channel];
         let pairs = (0..32).flat_map(|y| (0..16).map(move |x| (x, y)));
-        let pairs: Vec<f64> = pairs.map(|(x, y)| 0.5 * (pixel(x, y) + pixel(31 - x, y))).collect();
+        let pairs: Vec<f64> = pairs
+            .map(|(x, y)| 0.5 * (pixel(x, y) + pixel(31 - x, y)))
+            .collect();
         let (found, error) = mean_and_error(&pairs);
         let z = |truth: f64| (found - truth) / error.max(1.0e-6);
-        eprintln!("channel {channel}: {found} +- {error} for {}", truth[channel]);
-        assert!(z(truth[channel]).abs() < 3.9, "{channel}: {found} +- {error}");
+        eprintln!(
+            "channel {channel}: {found} +- {error} for {}",
+            truth[channel]
+        );
+        assert!(
+            z(truth[channel]).abs() < 3.9,
+            "{channel}: {found} +- {error}"
+        );
         assert!(z(1.02 * truth[channel]).abs() > 3.9, "companion: {error}");
         // Each value is seen.
         let (low, high) = (a[channel].min(b[channel]), a[channel].max(b[channel]));
-        assert!(pixel_range(&mean, channel).0 < low + 0.01 && pixel_range(&mean, channel).1 > high - 0.01);
+        assert!(
+            pixel_range(&mean, channel).0 < low + 0.01
+                && pixel_range(&mean, channel).1 > high - 0.01
+        );
     }
 }
 
 fn pixel_range(means: &[f64], channel: usize) -> (f64, f64) {
     let values = means.iter().skip(channel).step_by(3);
-    values.fold((f64::INFINITY, 0.0), |(low, high), x| (low.min(*x), high.max(*x)))
+    values.fold((f64::INFINITY, 0.0), |(low, high), x| {
+        (low.min(*x), high.max(*x))
+    })
 }
 
 #[test]
@@ -134,7 +167,11 @@ fn lit_by(texture: Option<Texture>, more: &str) -> Scene {
          [[sphere]]\ncenter = [1.2, 0.5, 0.4]\nradius = 0.3\nmaterial = \"other\"\n"
     ));
     if let Some(texture) = texture {
-        let lamp = scene.materials.iter_mut().find(|m| m.name == "lamp").expect("a lamp");
+        let lamp = scene
+            .materials
+            .iter_mut()
+            .find(|m| m.name == "lamp")
+            .expect("a lamp");
         *lamp = lamp.clone().with_texture(emission(), texture);
     }
     scene
@@ -162,7 +199,10 @@ fn textured_lamps_are_the_same_for_all_estimators() {
         0 => [9.0, 6.0, 3.0],
         _ => [0.0, 0.0, 0.1],
     });
-    let spots = image(Picture::new(8, 4, texels.collect()), DVec3::new(1.0, 1.0, 0.0));
+    let spots = image(
+        Picture::new(8, 4, texels.collect()),
+        DVec3::new(1.0, 1.0, 0.0),
+    );
     let values = [DVec3::new(6.0, 2.0, 0.0), DVec3::new(0.0, 1.0, 5.0)];
     let checker = Texture::Checker { values, size: 0.4 };
     let sky = "[environment]\nradiance = [0.1, 0.1, 0.1]\n";
@@ -177,12 +217,26 @@ fn textured_lamps_are_the_same_for_all_estimators() {
         ] {
             let found = brightness(&scene, integrator, sampling);
             let z = |scale: f64| (scale * found.0 - truth.0) / found.1.hypot(truth.1);
-            eprintln!("{name}, {}, {sampling:?}: {found:?}, {truth:?}, z = {:.2}", integrator.name(), z(1.0));
-            assert!(z(1.0).abs() < 4.5, "{name}, {integrator:?}, {sampling:?}: {found:?} for {truth:?}");
-            assert!(z(1.1).abs() > 4.5, "a tenth is not found: {found:?}, {truth:?}");
+            eprintln!(
+                "{name}, {}, {sampling:?}: {found:?}, {truth:?}, z = {:.2}",
+                integrator.name(),
+                z(1.0)
+            );
+            assert!(
+                z(1.0).abs() < 4.5,
+                "{name}, {integrator:?}, {sampling:?}: {found:?} for {truth:?}"
+            );
+            assert!(
+                z(1.1).abs() > 4.5,
+                "a tenth is not found: {found:?}, {truth:?}"
+            );
         }
         // Companion: a lamp that is as bright as the mean everywhere lights this floor otherwise.
-        let lamp = scene.materials.iter().find(|m| m.name == "lamp").expect("a lamp");
+        let lamp = scene
+            .materials
+            .iter()
+            .find(|m| m.name == "lamp")
+            .expect("a lamp");
         let mean = image(
             Picture::new(1, 1, vec![lamp.mean_emission().as_vec3().to_array()]),
             DVec3::Y,
@@ -200,7 +254,10 @@ fn a_constant_lamp_is_a_plain_one() {
     let picture = Picture::new(3, 2, vec![[4.0; 3]; 6]);
     let textured = lit_by(Some(image(picture, DVec3::Z)), "");
     let settings = settings(&plain, 24, 24, 16);
-    let (a, b) = (render_gpu(&textured, &settings), render_gpu(&plain, &settings));
+    let (a, b) = (
+        render_gpu(&textured, &settings),
+        render_gpu(&plain, &settings),
+    );
     let found = off(&a, &b);
     assert!(found < 64.0 * ULP, "{found:e}");
     // Companion: a hundredth brighter.
@@ -227,7 +284,11 @@ fn a_huge_ground_is_that_of_f64() {
     let values = [DVec3::new(0.9, 0.1, 0.5), DVec3::new(0.2, 0.8, 0.4)];
     for texture in [
         Texture::Checker { values, size: 0.45 },
-        Texture::Noise { values, size: 0.45, octaves: 4 },
+        Texture::Noise {
+            values,
+            size: 0.45,
+            octaves: 4,
+        },
     ] {
         for geometry in [GeometryChoice::Baked, GeometryChoice::List] {
             let scene = ground(texture.clone(), 0.0);

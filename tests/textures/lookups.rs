@@ -156,16 +156,25 @@ fn checkers_agree() {
                 };
                 let near = near.as_vec3().as_dvec3();
                 let value = |offset: DVec3| {
-                    texture_value(texture, &TexturePoint { offset, normal: DVec3::Y })
+                    texture_value(
+                        texture,
+                        &TexturePoint {
+                            offset,
+                            normal: DVec3::Y,
+                        },
+                    )
                 };
                 let cells = (anchor + near) / size;
                 // The roundings of the quotient, of the sum, and of where the pole is.
-                let off = |x: f64, near: f64| 3.0 * ULP * (near / size).abs() + 2.0 * ULP * x.fract().abs().max(1.0);
+                let off = |x: f64, near: f64| {
+                    3.0 * ULP * (near / size).abs() + 2.0 * ULP * x.fract().abs().max(1.0)
+                };
                 let on_plane = |axis: usize| {
                     let (x, near) = (cells[axis], near[axis]);
                     let gap = (x - x.round()).abs();
                     // What is exact is no edge: the plane through the centre, and powers of two.
-                    let exact = anchor == DVec3::ZERO && (near == 0.0 || size == 0.5 || size == 0.0625);
+                    let exact =
+                        anchor == DVec3::ZERO && (near == 0.0 || size == 0.5 || size == 0.0625);
                     gap < off(x, near) && !exact
                 };
                 if (0..3).any(on_plane) {
@@ -206,7 +215,11 @@ fn noise_is_within_its_bounds() {
     let mut worst = 0.0f64;
     for _ in 0..20_000 {
         let [x, y, z, _] = random.words();
-        let corner = DVec3::new(random.unit().round(), random.unit().round(), random.unit().round());
+        let corner = DVec3::new(
+            random.unit().round(),
+            random.unit().round(),
+            random.unit().round(),
+        );
         assert!(gradient_noise([x, y, z], corner).abs() < 1.0e-12);
         let face = DVec3::new(1.0, random.unit(), random.unit());
         let next = gradient_noise([x.wrapping_add(1), y, z], face.with_x(0.0));
@@ -215,7 +228,10 @@ fn noise_is_within_its_bounds() {
     assert!(worst < 1.0e-12, "{worst}");
     // Companion: not of the next cell but one.
     let face = DVec3::new(1.0, 0.3, 0.4);
-    assert!((gradient_noise([1, 2, 3], face) - gradient_noise([3, 2, 3], face.with_x(0.0))).abs() > 1.0e-3);
+    assert!(
+        (gradient_noise([1, 2, 3], face) - gradient_noise([3, 2, 3], face.with_x(0.0))).abs()
+            > 1.0e-3
+    );
     // The share of the second value is in [0, 1], and its mean 1/2.
     let (mut sum, mut squares) = (0.0, 0.0);
     const POINTS: u32 = 100_000;
@@ -308,13 +324,16 @@ fn noises_agree() {
                 // A noise is at most so steep: sqrt(2/3) times a gradient of sqrt(2), and the change of weights, by
                 // 15/8 along each axis, of slopes up to sqrt(2) times a diagonal. Each octave is twice as steep and
                 // half as strong.
-                let steep = (2.0f64 / 3.0).sqrt() * (2f64.sqrt() + 3f64.sqrt() * 15.0 / 8.0 * 2.0 * 6f64.sqrt());
+                let steep = (2.0f64 / 3.0).sqrt()
+                    * (2f64.sqrt() + 3f64.sqrt() * 15.0 / 8.0 * 2.0 * 6f64.sqrt());
                 let off = 4.0 * ULP * (near.abs().max_element() / size + 1.0);
                 let total = 2.0 - 0.5f64.powi(octaves as i32 - 1);
                 let share = 0.5 * steep * off * 3f64.sqrt() * f64::from(octaves) / total;
                 let allowed = share + 64.0 * ULP;
                 let error = (vector(*found) - truth).abs().max_element();
-                agreement.add(error, allowed, || format!("{near:?} {which}: {found:?} for {truth}"));
+                agreement.add(error, allowed, || {
+                    format!("{near:?} {which}: {found:?} for {truth}")
+                });
             }
             agreement
         };
@@ -343,7 +362,8 @@ fn near(a: DVec3, b: DVec3) -> bool {
 fn images_are_as_defined() {
     // By hand: -z is at U = 0, +x at a quarter, +z at a half; +y at V = 0.
     let picture = random_picture(8, 4, "by hand");
-    let at = |column: usize, row: usize| DVec3::from(picture.pixels[8 * row + column].map(f64::from));
+    let at =
+        |column: usize, row: usize| DVec3::from(picture.pixels[8 * row + column].map(f64::from));
     let plain = image(picture.clone(), DVec3::Y);
     for (column, row) in [(0, 0), (7, 0), (3, 1), (7, 3), (5, 2)] {
         let place = [(column as f64 + 0.5) / 8.0, (row as f64 + 0.5) / 4.0];
@@ -372,7 +392,10 @@ fn images_are_as_defined() {
     assert!(near(look(&aside, DVec3::NEG_Y), across));
     // A number reads the red channel.
     let number = TextureImage::new("x", Arc::new(picture.clone()), true, DVec3::Y);
-    assert!(near(look(&Texture::Image(number), DVec3::X), DVec3::splat(across.x)));
+    assert!(near(
+        look(&Texture::Image(number), DVec3::X),
+        DVec3::splat(across.x)
+    ));
 }
 
 #[test]
@@ -380,7 +403,13 @@ fn axes_turn_the_shortest_way() {
     let mut random = Random::new("axes");
     let picture = Arc::new(random_picture(2, 1, "axes"));
     let near_below = |x: f64| DVec3::new(x, -1.0, 0.5 * x);
-    let mut axes = vec![DVec3::Y, DVec3::X, near_below(1.0e-4), near_below(1.0e-9), near_below(1.0e-160)];
+    let mut axes = vec![
+        DVec3::Y,
+        DVec3::X,
+        near_below(1.0e-4),
+        near_below(1.0e-9),
+        near_below(1.0e-160),
+    ];
     axes.extend((0..200).map(|_| 3.0 * random.direction()));
     for axis in axes {
         let turn = TextureImage::new("x", Arc::clone(&picture), false, axis).rotation();
@@ -397,7 +426,10 @@ fn axes_turn_the_shortest_way() {
         }
     }
     let half = TextureImage::new("x", picture, false, DVec3::NEG_Y).rotation();
-    assert_eq!(half, glam::DMat3::from_diagonal(DVec3::new(1.0, -1.0, -1.0)));
+    assert_eq!(
+        half,
+        glam::DMat3::from_diagonal(DVec3::new(1.0, -1.0, -1.0))
+    );
 }
 
 #[test]
@@ -412,7 +444,10 @@ fn image_lookups_agree() {
     let scene = scene_of(&textures, false);
     let (probe, placement, numbers) = probe_of(&scene);
     let mut random = Random::new("lookups");
-    let mut normals: Vec<DVec3> = DVec3::AXES.into_iter().flat_map(|axis| [axis, -axis]).collect();
+    let mut normals: Vec<DVec3> = DVec3::AXES
+        .into_iter()
+        .flat_map(|axis| [axis, -axis])
+        .collect();
     for i in normals.len()..10_000 {
         let special = normals[i % 6];
         normals.push(match i % 3 {
@@ -455,7 +490,9 @@ fn image_lookups_agree() {
             let steep = size * turns;
             let allowed = steep.x + steep.y + 8.0 * ULP + 2.0 * ULP * size.max_element();
             let error = (vector(*found) - truth).abs().max_element();
-            agreement.add(error, allowed, || format!("{which} {normal}: {found:?} for {truth}"));
+            agreement.add(error, allowed, || {
+                format!("{which} {normal}: {found:?} for {truth}")
+            });
         }
         agreement
     };

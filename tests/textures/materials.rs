@@ -43,7 +43,10 @@ fn colours_and_roughnesses_may_be_textures() {
         ]
     );
     let sheen = texturable_key("sheen", "roughness").expect("it may be a texture");
-    assert_eq!((sheen.number, sheen.minimum, sheen.maximum), (true, 0.05, 1.0));
+    assert_eq!(
+        (sheen.number, sheen.minimum, sheen.maximum),
+        (true, 0.05, 1.0)
+    );
     // Each of them is one of its parameters, of that kind.
     for material in ALL {
         for kind in (material.cases)() {
@@ -65,7 +68,8 @@ fn colours_and_roughnesses_may_be_textures() {
 fn off(subjects: &Subjects, subject: usize) -> (Compared, Option<Compared>) {
     let ask = |wrong| samples(subjects, subject, CASES, wrong).expect("the probe runs");
     let evaluated = !subjects.kinds()[subject].is_delta();
-    let values = evaluated.then(|| values(subjects, subject, CASES, Wrong::default()).expect("the probe runs"));
+    let values = evaluated
+        .then(|| values(subjects, subject, CASES, Wrong::default()).expect("the probe runs"));
     (ask(Wrong::default()), values)
 }
 
@@ -83,7 +87,8 @@ fn materials_are_what_their_textures_say() {
         }
         // Companion: without its textures it is another material.
         let (drawn, evaluated) = off(&plain, subject);
-        let fails = drawn.agreement.any_fails() || evaluated.is_some_and(|e| e.agreement.any_fails());
+        let fails =
+            drawn.agreement.any_fails() || evaluated.is_some_and(|e| e.agreement.any_fails());
         assert!(fails, "{name}");
     }
 }

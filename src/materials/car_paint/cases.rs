@@ -38,22 +38,27 @@ pub(in crate::materials) fn cases() -> Vec<CarPaint> {
         [0.2; 3],
         [0.5, 0.2, 0.1],
     );
-    let flaked = |paint: CarPaint, [density, scale, spread, jitter]: [f64; 4], color: [f64; 3]| CarPaint {
-        flakes: Some(Flakes {
-            density,
-            scale,
-            spread,
-            jitter,
-            color: color.into(),
-        }),
-        ..paint
-    };
+    let flaked =
+        |paint: CarPaint, [density, scale, spread, jitter]: [f64; 4], color: [f64; 3]| CarPaint {
+            flakes: Some(Flakes {
+                density,
+                scale,
+                spread,
+                jitter,
+                color: color.into(),
+            }),
+            ..paint
+        };
     vec![
         // Flakes that need the search of one cell, of two and of three along each axis.
         flaked(silver_of([0.4, 0.2, 0.05]), [0.4, 20.0, 0.0, 0.0], [0.2; 3]),
         flaked(red.clone(), [0.6, 8.0, 0.3, 0.5], [0.2, 0.15, 0.1]),
         flaked(coated(&red, 1.5), [1.0, 3.0, 0.15, 1.0], [0.15, 0.15, 0.2]),
-        flaked(coated(&silver_of([0.3, 0.2, 0.1]), 2.0), [0.5, 50.0, 0.2, 0.25], [0.1; 3]),
+        flaked(
+            coated(&silver_of([0.3, 0.2, 0.1]), 2.0),
+            [0.5, 50.0, 0.2, 0.25],
+            [0.1; 3],
+        ),
         // One that reflects nothing by itself, a usual coat, one of diamond over paint without lobes.
         coated(&red, 1.0),
         coated(&silver, 1.5),
@@ -68,7 +73,12 @@ pub(in crate::materials) fn cases() -> Vec<CarPaint> {
         ),
         // Parts alone.
         case([0.5, 0.4, 0.3], [none; 3], [0.5; 3], [0.1; 3]),
-        case(none, [none, [0.2, 0.1, 0.05], none], [0.6; 3], [0.5, 0.05, 0.5]),
+        case(
+            none,
+            [none, [0.2, 0.1, 0.05], none],
+            [0.6; 3],
+            [0.5, 0.05, 0.5],
+        ),
         // The narrowest.
         case(
             [0.2, 0.2, 0.3],

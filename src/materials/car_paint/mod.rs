@@ -107,11 +107,11 @@ const BLACK: Base = Base {
     m: DVec3::ONE,
 };
 
-/// The paint on a flake of this normal.
+/// The paint on a flake of this normal in the surface's frame.
 fn flaked(paint: &Paint, flakes: &Flakes, normal: DVec3) -> Paint {
     let mut paint = *paint;
     paint.lobes[2].color = 4.0 * flakes.color;
-    paint.third_frame = Some(Frame::around(normal));
+    paint.third_frame = Frame::around(normal);
     paint
 }
 
@@ -163,7 +163,7 @@ impl CarPaint {
         } = self.base();
         Paint {
             frame: Frame::around(normal),
-            third_frame: None,
+            third_frame: Frame::around(DVec3::Z),
             diffuse,
             lobes: [0, 1, 2].map(|k| Lobe {
                 color: 4.0 * if k == 2 { self.third() } else { specular[k] },
@@ -178,7 +178,9 @@ impl CarPaint {
     /// All of it at a point.
     fn paint_at(&self, surface: &Surface) -> Paint {
         let paint = self.paint(surface.normal);
-        let flake = self.flakes.and_then(|flakes| Some((flakes, flakes.normal_at(surface)?)));
+        let flake = self
+            .flakes
+            .and_then(|flakes| Some((flakes, flakes.normal_within(surface, &paint.frame)?)));
         flake.map_or(paint, |(flakes, normal)| flaked(&paint, &flakes, normal))
     }
 
@@ -221,8 +223,14 @@ impl Bsdf for CarPaint {
             return None;
         }
         let needed = [
-            (self.diffuse.is_some(), "a car paint without `preset` needs `diffuse`"),
-            (self.specular.is_some(), "a car paint without `preset` needs `specular`"),
+            (
+                self.diffuse.is_some(),
+                "a car paint without `preset` needs `diffuse`",
+            ),
+            (
+                self.specular.is_some(),
+                "a car paint without `preset` needs `specular`",
+            ),
             (self.f0.is_some(), "a car paint without `preset` needs `f0`"),
             (self.m.is_some(), "a car paint without `preset` needs `m`"),
         ];
@@ -260,7 +268,7 @@ impl Bsdf for CarPaint {
     fn albedo(&self) -> DVec3 {
         let paint = self.paint(DVec3::Z);
         let flake = self.flakes.map_or(DVec3::ZERO, |flakes| {
-            let lobe = flaked(&paint, &flakes, paint.frame.normal());
+            let lobe = flaked(&paint, &flakes, DVec3::Z);
             let third = lobe.lobes[2];
             lobe.albedo() + (4.0 * (1.0 + third.m * third.m).sqrt() - 1.0) * third.color
         });
@@ -278,7 +286,9 @@ impl Bsdf for CarPaint {
     // 1 + t (max(d) - min(d))/F: that is linear in F. The mean of both is at most the larger.
     fn moment(&self, channel: usize, k: i32) -> f64 {
         let paint = self.paint(DVec3::Z);
-        let flakes = self.flakes.is_some_and(|flakes| flakes.color[channel] > 0.0);
+        let flakes = self
+            .flakes
+            .is_some_and(|flakes| flakes.color[channel] > 0.0);
         let glossy = flakes || paint.lobes.iter().any(|lobe| lobe.color[channel] > 0.0);
         let diffuse = paint.diffuse[channel];
         match (glossy, k, self.clearcoat) {
@@ -292,7 +302,9 @@ impl Bsdf for CarPaint {
                     diffuse => diffuse * f64::max(1.0 / most, 2.0 - least / most),
                 };
                 let lobes = paint.lobes.iter().map(|lobe| lobe.color.max_element());
-                let flake = self.flakes.map_or(0.0, |flakes| 4.0 * flakes.color.max_element());
+                let flake = self
+                    .flakes
+                    .map_or(0.0, |flakes| 4.0 * flakes.color.max_element());
                 let coat = f64::max(1.0, most + lobes.sum::<f64>() + flake);
                 f64::max(coat.powi(k), cosine_moment(k) * over.powi(k))
             }

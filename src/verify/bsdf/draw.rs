@@ -382,9 +382,7 @@ impl<'a> Draw<'a> {
                 over(rest * weight.powi(i as i32 / 3 + 1) / TAU, bounds[i])
             })
         });
-        let of_delta = |k: usize, c: usize| {
-            over(share * delta[c].powi(k as i32 + 1), bound(k, c))
-        };
+        let of_delta = |k: usize, c: usize| over(share * delta[c].powi(k as i32 + 1), bound(k, c));
         std::array::from_fn(|k| std::array::from_fn(|c| all[3 * k + c] + of_delta(k, c)))
     }
 }

@@ -15,9 +15,9 @@ use glam::DVec3;
 use crate::error::Result;
 use crate::gpu::bsdf_probe::{BsdfInput, BsdfProbe, Evaluated, Sampled};
 use crate::gpu::device::Gpu;
+use crate::materials::Value;
 use crate::materials::dielectric::fresnel;
 use crate::materials::{ALL, BsdfSample, BsdfValue, MaterialKind, Surface, sample_uniform};
-use crate::materials::Value;
 use crate::scene::{Material, Texture};
 use crate::settings::Integrator;
 use crate::verify::{Random, ULP};
@@ -182,7 +182,10 @@ fn disguised(kind: &MaterialKind) -> Material {
     let mut material = Material::new("disguised", kind.clone());
     let mut others = Vec::new();
     for key in kind.form().texturable() {
-        let own = kind.parameters().into_iter().find(|(name, _)| *name == key.key);
+        let own = kind
+            .parameters()
+            .into_iter()
+            .find(|(name, _)| *name == key.key);
         let (value, other) = match own.map(|(_, value)| value) {
             Some(Value::Vector(v)) => (v, Value::Vector(0.25 + 0.5 * (1.0 - v))),
             Some(Value::Number(x)) if x >= 0.5 => (DVec3::splat(x), Value::Number(0.33)),
