@@ -1,7 +1,7 @@
 //! The variance of one sample of what a material scatters, f cos/pdf, over the square of its mean: what its
 //! sampling leaves of the noise, by the f64 twin. At 45 degrees it is at most 0.3, in every channel and in
-//! luminance; but in a channel of car paint, which may have lobes of quite different hues, it is at most what is known of
-//! its choice of lobes. docs/materials.md has the figures.
+//! luminance; but 0.5 in a channel of car paint, some of whose cases have parts of quite different hues, of which one
+//! sample finds one (docs/car-paint.md). docs/materials.md has the figures.
 //!
 //! The power: sampling by the cosine alone, which is what no material would be without its own, is beyond that
 //! for every narrow lobe.
@@ -17,10 +17,10 @@ use gpu_trace::verify::bsdf::draw::OFFSETS;
 /// Those whose sampling is no closed matter.
 const MATERIALS: &[&str] = &["ashikhmin", "disney", "sheen", "nylon", "car-paint"];
 const BAR: f64 = 0.3;
-/// Of a channel.
-fn bar(name: &str) -> f64 {
+/// For the channels.
+fn channels_bar(name: &str) -> f64 {
     match name {
-        "car-paint" => 1.0,
+        "car-paint" => 0.5,
         _ => BAR,
     }
 }
@@ -136,7 +136,7 @@ fn sampling_leaves_little() {
             );
             let said = documented(name, &case);
             let as_said = own.iter().zip(&said).all(|(a, b)| (a - b).abs() <= 0.01);
-            let within = all <= BAR && largest(&own) <= bar(name);
+            let within = all <= BAR && largest(&own) <= channels_bar(name);
             if !within || said.len() != 5 || !as_said {
                 faults.push(format!("{name} {case}: {own:?}, documented {said:?}"));
             }
