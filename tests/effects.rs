@@ -458,9 +458,22 @@ fn singles() -> BTreeSet<Set> {
     alone.chain(stored.into_iter().flatten()).collect()
 }
 
+/// All but keys as textures that are like another one: a colour, a number and emission stand for them all here, where
+/// sets are many.
+fn unlike() -> impl Iterator<Item = Effect> + Clone {
+    let alike = |effect: &Effect| match effect {
+        Effect::Textured(number) => {
+            let key = textured_keys()[*number as usize];
+            !["albedo", "roughness", "emission"].contains(&key)
+        }
+        _ => false,
+    };
+    every().filter(move |effect| !alike(effect))
+}
+
 fn pairs() -> BTreeSet<Set> {
-    every()
-        .flat_map(|a| every().map(move |b| [a, b]))
+    unlike()
+        .flat_map(|a| unlike().map(move |b| [a, b]))
         .filter(|[a, b]| a < b)
         .filter_map(completed)
         .collect()
