@@ -125,7 +125,7 @@ impl TextureTable {
         unit: f64,
     ) -> usize {
         let cells = 1.0 / size;
-        let point = LatticePoint::of(anchor, cells);
+        let point = LatticePoint::by_corner(anchor, cells);
         let value = |v: DVec3| (unit * v).as_vec3().to_array();
         self.patterns.push(PatternRecord {
             first: value(values[0]),

@@ -283,6 +283,8 @@ fn ground(texture: Texture, shift: f64) -> Scene {
 fn a_huge_ground_is_that_of_f64() {
     let values = [DVec3::new(0.9, 0.1, 0.5), DVec3::new(0.2, 0.8, 0.4)];
     for texture in [
+        // Whose cells end where the ground's top is: its surface is all within the cells below.
+        Texture::Checker { values, size: 0.5 },
         Texture::Checker { values, size: 0.45 },
         Texture::Noise {
             values,
