@@ -50,6 +50,7 @@ pub(super) fn rows() -> Vec<Row> {
             "image_texel",
             "image_texels",
             "data::Image",
+            "SceneData::images",
             "IMAGE_COUNT",
             "IMAGE_WIDTH",
         ]),
