@@ -4,9 +4,9 @@
 use std::collections::BTreeSet;
 
 use crate::film::{Estimate, Film};
-use crate::materials::MaterialKind;
+use crate::materials::Form;
 use crate::placement::{PlacedSphere, Placement, Side};
-use crate::scene::{Environment, Scene};
+use crate::scene::{Environment, Material, Scene};
 use crate::settings::{Integrator, Settings};
 
 /// A bound on the share of the image's energy that the bounce limit removed, a fraction; 0 if it cut
@@ -23,7 +23,7 @@ pub fn energy_cut_at_most(scene: &Scene, film: &Film) -> Option<f64> {
     let places: BTreeSet<usize> = scene.spheres.iter().map(|s| s.material).collect();
     let used = || places.iter().map(|place| &scene.materials[*place]);
     let albedo = used()
-        .map(|material| material.kind.albedo().max_element())
+        .map(|material| material.albedo().max_element())
         .fold(0.0, f64::max);
     let emitted = used()
         .map(|material| material.emission.max_element())
@@ -105,8 +105,8 @@ fn harmless_bounces(k: i32, termination: f64) -> u32 {
 
 /// The factor by which an event at a material changes the k-th moment of a path's weight in a colour
 /// channel, at most: the survivors, 1 - p of all, are divided by 1 - p.
-fn moment_factor(kind: &MaterialKind, channel: usize, k: i32, termination: f64) -> f64 {
-    kind.moment(channel, k) / (1.0 - termination).powi(k - 1)
+fn moment_factor(material: &Material, channel: usize, k: i32, termination: f64) -> f64 {
+    material.moment(channel, k) / (1.0 - termination).powi(k - 1)
 }
 
 /// Surfaces between which the moments of weights grow most.
@@ -135,12 +135,13 @@ struct Factor {
 fn worst_cycle(scene: &Scene, placement: &Placement, k: i32, termination: f64) -> Option<Cycle> {
     let cycle = |channel| {
         let factor = |sphere: &PlacedSphere| {
-            let kind = &scene.materials[sphere.material].kind;
+            let material = &scene.materials[sphere.material];
+            let hemispherical = material.forms().any(Form::is_hemispherical);
             Factor {
-                factor: moment_factor(kind, channel, k, termination),
+                factor: moment_factor(material, channel, k, termination),
                 material: sphere.material,
                 sees_itself: sphere.side != Side::Outside,
-                bounded: !kind.form().is_hemispherical() && termination == 0.0,
+                bounded: !hemispherical && termination == 0.0,
             }
         };
         let factors: Vec<Factor> = placement.spheres.iter().map(factor).collect();
@@ -189,7 +190,7 @@ impl Cycle {
         let of = |m: &usize| {
             let material = &scene.materials[*m];
             let name = material.name.escape_debug();
-            let albedo = material.kind.albedo()[self.channel];
+            let albedo = material.albedo()[self.channel];
             format!("\"{name}\" (albedo {albedo:.3})")
         };
         let names: Vec<String> = self.materials.iter().map(of).collect();

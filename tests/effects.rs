@@ -11,12 +11,14 @@ use crate::common::{scene_file, scene_files};
 use glam::{DVec2, DVec3};
 use gpu_trace::effects::{Effect, Effects, table};
 use gpu_trace::image::Picture;
+use gpu_trace::materials::texturable::{texturable_key, textured_keys};
 use gpu_trace::materials::{ALL, MaterialKind, forms};
 use gpu_trace::placement::Placement;
 use gpu_trace::placement::lights::MOST_WEIGHED;
 use gpu_trace::sampler::Sampler;
 use gpu_trace::scene::{
     Camera, Environment, Gradient, Handedness, Material, RenderDefaults, Scene, Sky, Sphere,
+    Texture, TextureImage,
 };
 use gpu_trace::settings::{GeometryChoice, Integrator, LightSampling, Offset, Settings, View};
 use gpu_trace::shader::{Kernel, Stage, declared_names, link};
@@ -140,6 +142,48 @@ fn environment_of(set: &Set) -> Option<Environment> {
     }
 }
 
+/// For each key that is a texture in `set` a material of one of `kinds` with each kind of textures in it.
+fn textured(set: &Set, kinds: &[MaterialKind]) -> Vec<Material> {
+    let keys = set.iter().filter_map(|effect| match effect {
+        Effect::Textured(number) => Some(textured_keys()[*number as usize]),
+        _ => None,
+    });
+    let mut materials = Vec::new();
+    for name in keys {
+        let of = |kind: &MaterialKind| Some((texturable_key(kind.name(), name)?, kind.clone()));
+        let Some((key, kind)) = kinds.iter().find_map(of) else {
+            continue;
+        };
+        // What is smooth stays so.
+        let smooth = name == "roughness" && kind.is_delta();
+        let values = match smooth {
+            true => [DVec3::ZERO; 2],
+            false => [DVec3::splat(0.3), DVec3::splat(0.6)],
+        };
+        let image = Picture::new(2, 1, values.map(|v| v.as_vec3().to_array()).into());
+        let image = TextureImage::new("image", Arc::new(image), key.number, DVec3::Y);
+        let size = 0.5;
+        for (effect, texture) in [
+            (Effect::TextureChecker, Texture::Checker { values, size }),
+            (
+                Effect::TextureNoise,
+                Texture::Noise {
+                    values,
+                    size,
+                    octaves: 2,
+                },
+            ),
+            (Effect::TextureImage, Texture::Image(image)),
+        ] {
+            if set.contains(&effect) {
+                let plain = Material::new(&format!("{name} {effect:?}"), kind.clone());
+                materials.push(plain.with_texture(key, texture));
+            }
+        }
+    }
+    materials
+}
+
 /// A scene and settings that ask for exactly the effects of `set`, where that is possible.
 fn asking_for(set: &Set) -> (Scene, Settings) {
     let has = |effect| set.contains(&effect);
@@ -163,15 +207,16 @@ fn asking_for(set: &Set) -> (Scene, Settings) {
         }
     }
     let material = |(i, kind): (usize, &MaterialKind)| Material {
-        name: format!("m{i}"),
-        kind: kind.clone(),
         emission: DVec3::splat(if has(Effect::Emission) && i == 0 {
             2.0
         } else {
             0.0
         }),
+        ..Material::new(&format!("m{i}"), kind.clone())
     };
     let glass = kinds.iter().position(|kind| kind.transmits());
+    let plain = kinds.iter().enumerate().map(material);
+    let materials: Vec<Material> = plain.chain(textured(set, &kinds)).collect();
     let mut spheres = Vec::new();
     let mut sphere = |material: usize, x: f64, y: f64, z: f64, radius: f64| {
         spheres.push(Sphere {
@@ -182,7 +227,7 @@ fn asking_for(set: &Set) -> (Scene, Settings) {
         });
     };
     // Off the view axis: what the view starts at has a pole frame.
-    for i in 0..kinds.len() {
+    for i in 0..materials.len() {
         sphere(i, 2.0 * i as f64, 1.5, 0.0, 0.5);
     }
     if let Some(i) = glass {
@@ -225,7 +270,7 @@ fn asking_for(set: &Set) -> (Scene, Settings) {
         height: 16,
         render: RenderDefaults::default(),
         environment: environment_of(set),
-        materials: kinds.iter().enumerate().map(material).collect(),
+        materials,
         spheres,
     };
     let settings = Settings {
@@ -413,9 +458,22 @@ fn singles() -> BTreeSet<Set> {
     alone.chain(stored.into_iter().flatten()).collect()
 }
 
+/// All but keys as textures that are like another one: a colour, a number and emission stand for them all here, where
+/// sets are many.
+fn unlike() -> impl Iterator<Item = Effect> + Clone {
+    let alike = |effect: &Effect| match effect {
+        Effect::Textured(number) => {
+            let key = textured_keys()[*number as usize];
+            !["albedo", "roughness", "emission"].contains(&key)
+        }
+        _ => false,
+    };
+    every().filter(move |effect| !alike(effect))
+}
+
 fn pairs() -> BTreeSet<Set> {
-    every()
-        .flat_map(|a| every().map(move |b| [a, b]))
+    unlike()
+        .flat_map(|a| unlike().map(move |b| [a, b]))
         .filter(|[a, b]| a < b)
         .filter_map(completed)
         .collect()

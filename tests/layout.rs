@@ -425,9 +425,8 @@ fn material_agrees_for_all_forms() {
                 let code = forms().iter().position(|form| *form == kind.form());
                 let code = code.expect("a form of the list") as u32;
                 let material = Material {
-                    name: "m".into(),
                     emission: DVec3::new(7.0, 7.125, 7.25),
-                    kind,
+                    ..Material::new("m", kind)
                 };
                 assert_eq!(wrong_record(&material, &members, code), None, "{names:?}");
                 // Companion: another code.

@@ -62,6 +62,7 @@ mod sky;
 mod slurm;
 mod sobol;
 mod stream;
+mod textures;
 mod variance_law;
 mod view;
 mod walls;

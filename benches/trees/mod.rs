@@ -86,13 +86,12 @@ pub(crate) fn crowd(count: usize) -> Scene {
         height: 240,
         render: RenderDefaults::default(),
         environment: Some(Environment::Constant(DVec3::ONE)),
-        materials: vec![Material {
-            name: "gray".into(),
-            kind: MaterialKind::Diffuse(Diffuse {
+        materials: vec![Material::new(
+            "gray",
+            MaterialKind::Diffuse(Diffuse {
                 albedo: DVec3::splat(0.5),
             }),
-            emission: DVec3::ZERO,
-        }],
+        )],
         spheres,
     }
 }

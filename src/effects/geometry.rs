@@ -64,6 +64,10 @@ pub(super) fn rows() -> Vec<Row> {
             "poles",
             "POLE_COUNT",
             "Light::curvature",
+            "Pattern::place",
+            "Pattern::cell",
+            "Pattern::unused",
+            "on_sphere",
         ]),
         Row::new(
             Effect::Interior,

@@ -61,7 +61,6 @@ pub(super) fn rows() -> Vec<Row> {
         )
         .marks([
             "light::sky",
-            "core::turn",
             "SKY_WIDTH",
             "SKY_HEIGHT",
             "SKY_TURN",

@@ -13,10 +13,12 @@ mod paths;
 mod role;
 mod samples;
 mod surfaces;
+mod textures;
 
 use std::collections::BTreeSet;
 use std::sync::LazyLock;
 
+use crate::materials::texturable::textured_keys;
 use crate::materials::{Form, flakes, forms};
 use crate::placement::{PlacedSphere, Placement};
 use crate::scene::{Material, Scene};
@@ -66,6 +68,14 @@ pub enum Effect {
     Absorption,
     /// Refractive indices by the wavelength.
     Dispersion,
+    /// Values in the cells of a lattice.
+    TextureChecker,
+    /// Values by a noise.
+    TextureNoise,
+    /// Values by images.
+    TextureImage,
+    /// A key of materials that may be a texture, by its place among all of them, where it is one.
+    Textured(u32),
     /// Surfaces that emit.
     Emission,
     /// A constant environment.
@@ -165,6 +175,7 @@ pub fn table() -> &'static [Row] {
             geometry::rows(),
             samples::rows(),
             surfaces::rows(),
+            textures::rows(),
             light::rows(),
             paths::rows(),
         ];
@@ -374,6 +385,26 @@ impl Effects {
         self.forms().any(|(_, form)| form.offset)
     }
 
+    /// Whether values of materials depend on where on their sphere a point is.
+    #[must_use]
+    pub fn has_textures(&self) -> bool {
+        self.has_patterns() || self.has(Effect::TextureImage)
+    }
+
+    /// Whether some of these are patterns on the offset from the sphere's centre.
+    #[must_use]
+    pub fn has_patterns(&self) -> bool {
+        self.has(Effect::TextureChecker) || self.has(Effect::TextureNoise)
+    }
+
+    /// The keys that are textures.
+    pub fn textured_keys(&self) -> impl Iterator<Item = &'static str> {
+        self.used().filter_map(|effect| match effect {
+            Effect::Textured(number) => Some(textured_keys()[number as usize]),
+            _ => None,
+        })
+    }
+
     /// Whether a paint has flakes.
     #[must_use]
     pub fn has_flakes(&self) -> bool {
@@ -414,6 +445,8 @@ impl Effects {
             ("transmits", self.transmits()),
             ("relative", self.looks_at_index()),
             ("offset", self.looks_at_offset()),
+            ("textured", self.has_textures()),
+            ("patterned", self.has_patterns()),
             ("flaked", self.has_flakes()),
             ("weighed", self.weighs_lights()),
             ("sampled", self.samples_light()),

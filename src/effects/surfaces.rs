@@ -17,7 +17,7 @@ pub(super) fn forms_that(wanted: impl Fn(&Form) -> bool) -> Vec<Effect> {
 pub(super) fn rows() -> Vec<Row> {
     let materials = (0..).zip(forms()).map(|(code, form)| {
         let row = Row::new(Effect::Form(code), form.name, form.what, move |asked| {
-            asked.surfaces(|material| material.kind.form() == *form)
+            asked.surfaces(|material| material.forms().any(|own| own == *form))
         })
         .marks(["sample", "evaluate", "share"].map(|what| format!("{what}_{}", form.name)));
         if form.transmits {

@@ -120,6 +120,20 @@ impl BsdfProbe {
     /// # Errors
     /// If the device fails.
     pub fn new(gpu: &Gpu, materials: &[MaterialKind], integrator: Integrator) -> Result<Self> {
+        let named =
+            |(i, kind): (usize, &MaterialKind)| Material::new(&format!("m{i}"), kind.clone());
+        Self::of(
+            gpu,
+            materials.iter().enumerate().map(named).collect(),
+            integrator,
+        )
+    }
+
+    /// The same of materials that may have textures, which are looked up where a question is.
+    ///
+    /// # Errors
+    /// If the device fails.
+    pub fn of(gpu: &Gpu, materials: Vec<Material>, integrator: Integrator) -> Result<Self> {
         let scene = scene_of(materials);
         let settings = Settings {
             integrator,
@@ -149,12 +163,7 @@ impl BsdfProbe {
 }
 
 /// A ball of each material, side by side and none of them special.
-fn scene_of(materials: &[MaterialKind]) -> Scene {
-    let named = |(i, kind): (usize, &MaterialKind)| Material {
-        name: format!("m{i}"),
-        kind: kind.clone(),
-        emission: DVec3::ZERO,
-    };
+fn scene_of(materials: Vec<Material>) -> Scene {
     let ball = |i: usize| Sphere {
         center: DVec3::new(3.0 * i as f64, 0.0, 0.0),
         radius: 1.0,
@@ -175,7 +184,7 @@ fn scene_of(materials: &[MaterialKind]) -> Scene {
         height: 16,
         render: RenderDefaults::default(),
         environment: None,
-        materials: materials.iter().enumerate().map(named).collect(),
         spheres: (0..materials.len()).map(ball).collect(),
+        materials,
     }
 }

@@ -11,6 +11,7 @@ use crate::gpu::layout::{
     LightRecord, MaterialRecord, PoleRecord, SKY_TABLE_WIDTH, SphereRecord, anchored_spheres,
     light_weight, sky_table,
 };
+use crate::gpu::textures::{IMAGE_WIDTH, TextureTable};
 use crate::image::Picture;
 use crate::materials::Member;
 use crate::placement::Placement;
@@ -24,6 +25,7 @@ pub(super) const SCENE: &str = "scene";
 pub(super) const TREE: &str = "tree";
 pub(super) const SKY: &str = "sky";
 pub(super) const SKY_TABLE: &str = "sky_table";
+pub(super) const IMAGES: &str = "image_texels";
 
 /// Whether the device takes the scene's data, and `partials` bytes of partial sums.
 ///
@@ -79,6 +81,28 @@ pub(super) fn check_sky(limits: &wgpu::Limits, sky: &Sky) -> Result<()> {
     Ok(())
 }
 
+/// Whether the device takes the images of textures.
+///
+/// # Errors
+/// [`Error::DeviceLimit`] if they have too many texels together.
+pub(super) fn check_images(
+    limits: &wgpu::Limits,
+    scene: &Scene,
+    placement: &Placement,
+) -> Result<()> {
+    let (rows, most) = (
+        TextureTable::new(scene, placement).rows(),
+        limits.max_texture_dimension_2d,
+    );
+    if rows > most.into() || IMAGE_WIDTH > most {
+        return Err(Error::DeviceLimit(format!(
+            "the images of textures need {IMAGE_WIDTH} x {rows} texels, more than the device's limit of {most} a \
+             side; --backend cpu has no such limit"
+        )));
+    }
+    Ok(())
+}
+
 /// What the device holds of a scene.
 #[derive(Debug)]
 pub(super) struct SceneBytes {
@@ -87,6 +111,7 @@ pub(super) struct SceneBytes {
     /// With its width.
     sky: Option<(Vec<u8>, u32)>,
     sky_table: Option<Vec<u8>>,
+    images: Option<Vec<u8>>,
 }
 
 impl SceneBytes {
@@ -101,8 +126,12 @@ impl SceneBytes {
             let tree = effects.has(Effect::Bvh).then(|| placement.tree())?;
             Some(bytemuck::cast_slice(&tree.texels).to_vec())
         };
+        let textures = TextureTable::new(scene, placement);
         Self {
-            data: scene_data(kernel, scene, placement, effects),
+            data: scene_data(kernel, scene, placement, effects, &textures),
+            images: effects
+                .has(Effect::TextureImage)
+                .then(|| bytemuck::cast_slice(&textures.texels()).to_vec()),
             tree: texels(effects),
             sky: sky_of(scene, effects).map(|sky| sky_texels(sky, placement, effects)),
             sky_table: sky_of(scene, effects)
@@ -125,6 +154,9 @@ impl SceneBytes {
         let table = self.sky_table.as_ref();
         if let Some(table) = table.filter(|_| pass.binds(SKY_TABLE)) {
             recording.upload_texels(SKY_TABLE, table, SKY_TABLE_WIDTH);
+        }
+        if let Some(images) = self.images.as_ref().filter(|_| pass.binds(IMAGES)) {
+            recording.upload_texels(IMAGES, images, IMAGE_WIDTH);
         }
     }
 }
@@ -165,6 +197,7 @@ fn scene_data(
     scene: &Scene,
     placement: &Placement,
     effects: &Effects,
+    textures: &TextureTable,
 ) -> Option<Vec<u8>> {
     let (members, size) = kernel.struct_members("SceneData")?;
     let mut bytes = vec![0; size as usize];
@@ -174,7 +207,9 @@ fn scene_data(
             "spheres" => spheres(placement),
             "poles" => poles(placement),
             "attributes" => attributes(scene, placement, effects),
-            "materials" => materials(kernel, scene, placement, effects),
+            "materials" => materials(kernel, scene, placement, effects, textures),
+            "patterns" => patterns(kernel, textures),
+            "images" => bytemuck::cast_slice(textures.images()).to_vec(),
             "lights" => lights(kernel, placement, effects),
             other => unreachable!("no scene data {other}"),
         };
@@ -230,19 +265,40 @@ fn attributes(scene: &Scene, placement: &Placement, effects: &Effects) -> Vec<u8
     bytes_of(words.into_iter())
 }
 
-fn materials(kernel: &Kernel, scene: &Scene, placement: &Placement, effects: &Effects) -> Vec<u8> {
+fn materials(
+    kernel: &Kernel,
+    scene: &Scene,
+    placement: &Placement,
+    effects: &Effects,
+    textures: &TextureTable,
+) -> Vec<u8> {
     let (offsets, size) = kernel.struct_members("Material").unwrap_or_default();
     let members: Vec<(Member, u32)> = std::iter::zip(material_members(effects), offsets)
         .map(|(member, (_, offset))| (member, offset))
         .collect();
-    let shared = scene.materials.iter();
-    let shared = shared.map(|m| MaterialRecord::new(m, placement.radiance_scale, placement.scale));
-    let anchored = anchored_spheres(scene, placement);
-    let anchored =
-        anchored.map(|i| MaterialRecord::of_sphere(&placement.spheres[i], scene, placement));
+    let shared = scene.materials.iter().enumerate();
+    let shared = shared.map(|(i, m)| {
+        let record = MaterialRecord::new(m, placement.radiance_scale, placement.scale);
+        record.with_textures(m, textures.of_material(i))
+    });
+    let anchored = anchored_spheres(scene, placement).map(|i| {
+        let sphere = &placement.spheres[i];
+        let record = MaterialRecord::of_sphere(sphere, scene, placement);
+        let numbers = textures.of_sphere(i, placement);
+        record.with_textures(&scene.materials[sphere.material], numbers)
+    });
     let records = shared.chain(anchored);
     records
         .flat_map(|record| record.bytes(&members, size))
+        .collect()
+}
+
+fn patterns(kernel: &Kernel, textures: &TextureTable) -> Vec<u8> {
+    let (_, size) = kernel.struct_members("Pattern").unwrap_or_default();
+    let records = textures.patterns().iter();
+    records
+        .flat_map(|record| &bytemuck::bytes_of(record)[..size as usize])
+        .copied()
         .collect()
 }
 

@@ -9,12 +9,15 @@ use glam::DVec3;
 
 use crate::effects::{Effect, Effects};
 use crate::film::{TILE, Tiles};
+use crate::gpu::textures::Numbers;
 use crate::materials::dielectric::Index;
+use crate::materials::texturable::{key_values, texture_member};
 use crate::materials::{Member, MemberValue, forms};
 use crate::placement::sky::{Band, Entry};
 use crate::placement::{Light, PlacedCamera, PlacedSphere, Placement, SkyTable};
 use crate::scene::{Material, Scene};
 use crate::settings::Rect;
+use crate::shader::textures::smooth_kind;
 
 /// `Sphere` of `shaders/scene/list.wesl`: a sphere about its centre.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
@@ -311,8 +314,11 @@ pub fn anchored_spheres<'a>(
     scene: &'a Scene,
     placement: &'a Placement,
 ) -> impl Iterator<Item = usize> + 'a {
-    let form = |i: &usize| scene.materials[placement.spheres[*i].material].kind.form();
-    (0..placement.poles).filter(move |i| !form(i).anchored.is_empty())
+    let is_anchored = move |i: &usize| {
+        let material = &scene.materials[placement.spheres[*i].material];
+        !material.kind.form().anchored.is_empty() || material.has_patterns()
+    };
+    (0..placement.poles).filter(is_anchored)
 }
 
 /// What a kernel may want to know of a material, rounded to f32.
@@ -348,6 +354,27 @@ impl MaterialRecord {
         Self {
             values: common.chain(own).collect(),
         }
+    }
+
+    /// The same with the numbers of its textures, and what their values are put in place of.
+    #[must_use]
+    pub fn with_textures(mut self, material: &Material, numbers: &Numbers) -> Self {
+        if numbers.is_empty() {
+            return self;
+        }
+        let kind = &material.kind;
+        let smooth = material.smooth_form().unwrap_or(kind.form());
+        let code = forms().iter().position(|form| *form == smooth);
+        let code = code.expect("every material is in the list");
+        self.values
+            .push((smooth_kind(), MemberValue::Word(code as u32)));
+        let keys = key_values(kind.parameters());
+        self.values
+            .extend(keys.map(|(member, number)| (member, number.into())));
+        let numbers = numbers.iter();
+        let members = numbers.map(|(key, n)| (texture_member(key), MemberValue::Word(*n)));
+        self.values.extend(members);
+        self
     }
 
     /// That of a sphere's material, with what depends on where its pole is.

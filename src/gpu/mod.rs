@@ -10,3 +10,4 @@ mod pace;
 pub mod probe;
 mod region;
 pub mod renderer;
+pub mod textures;

@@ -78,6 +78,9 @@ impl GpuRenderer {
         if let Some(sky) = data::sky_of(scene, effects) {
             data::check_sky(&gpu.limits, sky)?;
         }
+        if effects.has(Effect::TextureImage) {
+            data::check_images(&gpu.limits, scene, placement)?;
+        }
 
         let program = Program::new(&gpu, "path", kernel);
         let mut constants = vec![("MAX_BOUNCES", f64::from(settings.max_bounces))];

@@ -31,6 +31,7 @@ pub(super) const FORMS: &[Form] = &[
             Member::scalar("alpha_v"),
             Member::vector("axis"),
         ],
+        derives: Some(&["roughness", "anisotropy"]),
         ..Form::of(NAME)
     },
 ];
@@ -55,7 +56,11 @@ pub struct Conductor {
     pub k: Option<DVec3>,
     /// 0 is smooth; the square of it is the GGX alpha.
     #[serde(default)]
-    #[schemars(range(min = 0.0, max = 1.0), extend("default" = 0.0))]
+    #[schemars(
+        range(min = 0.0, max = 1.0),
+        extend("default" = 0.0),
+        transform = schema::texture
+    )]
     pub roughness: f64,
     /// How much wider highlights are along the tangent axis × normal than across it.
     #[serde(default)]

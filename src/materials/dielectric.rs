@@ -30,6 +30,7 @@ pub(super) const FORMS: &[Form] = &[
         what: "rough glass: the same about GGX microfacets",
         transmits: true,
         members: &[Member::scalar("ior"), Member::scalar("alpha")],
+        derives: Some(&["roughness"]),
         ..Form::of(NAME)
     },
 ];
@@ -55,7 +56,11 @@ pub struct Dielectric {
     pub sellmeier: Option<Sellmeier>,
     /// 0 is smooth; the square of it is the GGX alpha.
     #[serde(default)]
-    #[schemars(range(min = 0.0, max = 1.0), extend("default" = 0.0))]
+    #[schemars(
+        range(min = 0.0, max = 1.0),
+        extend("default" = 0.0),
+        transform = schema::texture
+    )]
     pub roughness: f64,
     /// What is absorbed of light inside, per unit length and channel.
     #[serde(default)]

@@ -44,6 +44,15 @@ pub(super) const FORMS: &[Form] = &[Form {
         Member::scalar("diffuse_weight"),
         Member::scalar("cosine_share"),
     ],
+    derives: Some(&[
+        "roughness",
+        "anisotropic",
+        "metallic",
+        "specular",
+        "specular_tint",
+        "sheen",
+        "sheen_tint",
+    ]),
     ..Form::of(NAME)
 }];
 
@@ -70,7 +79,11 @@ pub struct Disney {
     pub metallic: f64,
     /// Reflection at normal incidence, in units of 0.08.
     #[serde(default = "half")]
-    #[schemars(range(min = 0.0, max = 1.0), extend("default" = 0.5))]
+    #[schemars(
+        range(min = 0.0, max = 1.0),
+        extend("default" = 0.5),
+        transform = schema::texture
+    )]
     pub specular: f64,
     /// How much of the base's hue it has.
     #[serde(default)]
@@ -78,7 +91,11 @@ pub struct Disney {
     pub specular_tint: f64,
     /// Of base and microfacets; the square of it is their alpha, 0.001 at least.
     #[serde(default = "half")]
-    #[schemars(range(min = 0.0, max = 1.0), extend("default" = 0.5))]
+    #[schemars(
+        range(min = 0.0, max = 1.0),
+        extend("default" = 0.5),
+        transform = schema::texture
+    )]
     pub roughness: f64,
     /// How much wider highlights are along the tangent axis × normal than across it.
     #[serde(default)]

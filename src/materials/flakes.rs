@@ -56,7 +56,7 @@ pub struct Flakes {
     #[schemars(range(min = 0.0, max = 1.0))]
     pub jitter: f64,
     /// Colour of the third lobe on a flake, which reflects about four times that.
-    #[schemars(schema_with = "schema::share")]
+    #[schemars(schema_with = "schema::plain_share")]
     pub color: DVec3,
 }
 

@@ -27,6 +27,10 @@ pub struct Form {
     /// Of one that looks at the offset: members that depend on where the pole of a sphere is that is about its pole.
     /// Such a sphere has a record of the material for itself; without pole frames no kernel has them.
     pub anchored: &'static [Member],
+    /// Where members follow from the values of keys that may be textures: the kernel's `derive_NAME(material)` makes
+    /// them anew from those values, and from the numbers of these keys of the scene file, which it finds as
+    /// `key_KEY`.
+    pub derives: Option<&'static [&'static str]>,
 }
 
 impl Form {
@@ -44,6 +48,7 @@ impl Form {
             offset: false,
             members: &[],
             anchored: &[],
+            derives: None,
         }
     }
 

@@ -27,6 +27,18 @@ impl LatticePoint {
         }
     }
 
+    /// The corner of cells that is nearest to an offset, and the offset from there, in [-1/2, 1/2]: a plane between
+    /// cells next to it is known to the digits of the distance from it.
+    #[must_use]
+    pub fn by_corner(offset: DVec3, cells: f64) -> Self {
+        let x = cells * offset;
+        let whole = x.round();
+        Self {
+            cell: whole.to_array().map(|x| x.rem_euclid(2f64.powi(32)) as u32),
+            place: x - whole,
+        }
+    }
+
     /// The values of [`anchor_members`].
     #[must_use]
     pub fn members(&self) -> Vec<MemberValue> {

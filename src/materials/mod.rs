@@ -19,12 +19,14 @@ mod paint;
 pub mod powers;
 mod scattered;
 pub mod schema;
+pub mod texturable;
 mod uniform;
+mod value;
 
 use std::ops::Deref;
 use std::sync::LazyLock;
 
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::Deserialize;
 
@@ -32,7 +34,9 @@ use dielectric::Index;
 
 pub use contract::{BsdfSample, BsdfValue, Event, Surface};
 pub use form::{Form, Member, MemberKind, MemberValue};
+pub use texturable::Texturable;
 pub use uniform::sample_uniform;
+pub use value::Value;
 
 /// What a material says and does. The optics are the twin of `shaders/materials/NAME.wesl`, where the
 /// contract is stated (`contract.wesl`); `wo` is on the side of the surface's normal.
@@ -111,21 +115,6 @@ pub struct Mistake {
     pub help: &'static str,
 }
 
-/// The value of a parameter.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Value {
-    /// A number.
-    Number(f64),
-    /// A colour or a vector.
-    Vector(DVec3),
-    /// Two numbers.
-    Pair(DVec2),
-    /// Several colours or vectors.
-    Vectors(Vec<DVec3>),
-    /// An inline table.
-    Table(Vec<(&'static str, Value)>),
-}
-
 /// A type of materials.
 pub struct MaterialType {
     /// The `type` in scene files, and the name of its files.
@@ -187,6 +176,17 @@ macro_rules! materials {
             fn deref(&self) -> &(dyn Bsdf + 'static) {
                 match self {
                     $(Self::$Type(material) => material),*
+                }
+            }
+        }
+
+        impl MaterialKind {
+            /// The same material with other values of some of its parameters.
+            #[must_use]
+            pub fn with(&self, changes: &[(&'static str, Value)]) -> Self {
+                let parameters = self.parameters();
+                match self {
+                    $(Self::$Type(_) => Self::$Type(value::made_of(parameters, changes))),*
                 }
             }
         }

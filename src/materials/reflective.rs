@@ -27,6 +27,7 @@ pub(super) const FORMS: &[Form] = &[Form {
         Member::scalar("lobe_weight"),
         Member::scalar("color_weight"),
     ],
+    derives: Some(&[]),
     ..Form::of(NAME)
 }];
 

@@ -25,6 +25,7 @@ pub(super) const FORMS: &[Form] = &[Form {
         // How wide it scatters about the plane of incidence: of the density that is sampled.
         Member::scalar("sheen_spread"),
     ],
+    derives: Some(&["roughness"]),
     ..Form::of(NAME)
 }];
 
@@ -41,7 +42,7 @@ pub struct Sheen {
     #[schemars(schema_with = "super::schema::share")]
     pub color: DVec3,
     /// How far they lean.
-    #[schemars(range(min = MIN_ROUGHNESS, max = 1.0))]
+    #[schemars(range(min = MIN_ROUGHNESS, max = 1.0), transform = super::schema::texture)]
     pub roughness: f64,
 }
 

@@ -15,7 +15,7 @@ use crate::settings::{LightSampling, Offset};
 pub struct Light {
     /// Index into the placement's spheres.
     pub sphere: usize,
-    /// Luminance of its radiance.
+    /// Luminance of its radiance, where that is a texture of its mean.
     pub luminance: f64,
     /// Of being drawn from the table: its share of the power of all, of walls what is near the picture.
     pub probability: f64,
@@ -149,7 +149,7 @@ impl Lights {
         if offset == Offset::Exact && spheres.iter().any(unknown) {
             return Self::default();
         }
-        let emitted = |i: usize| luminance(scene.materials[spheres[i].material].emission);
+        let emitted = |i: usize| luminance(scene.materials[spheres[i].material].mean_emission());
         let picture = extent(spheres);
         let size = |s: &PlacedSphere| match s.pole {
             Some(_) => s.radius.min(picture),

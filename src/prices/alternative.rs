@@ -5,9 +5,10 @@ use glam::DVec3;
 use super::Told;
 use crate::effects::{BAKED_MOST, Effect};
 use crate::job::{Job, prepare};
+use crate::materials::texturable::{EMISSION, texturable_key, textured_keys};
 use crate::materials::{MaterialKind, dielectric::Dielectric, diffuse::Diffuse, forms};
 use crate::sampler::Sampler;
-use crate::scene::Scene;
+use crate::scene::{Scene, Texture, Textured};
 use crate::settings::{GeometryChoice, Integrator, LightSampling, Offset, Settings};
 
 /// What stands in an effect's place.
@@ -116,9 +117,27 @@ fn change(
             });
             "the index of yellow light for all"
         }
+        Effect::TextureChecker => {
+            keep_textures(scene, |t| !matches!(t.texture, Texture::Checker { .. }));
+            "its largest value all over"
+        }
+        Effect::TextureNoise => {
+            keep_textures(scene, |t| !matches!(t.texture, Texture::Noise { .. }));
+            "its largest value all over"
+        }
+        Effect::TextureImage => {
+            keep_textures(scene, |t| !matches!(t.texture, Texture::Image(_)));
+            "its largest value all over"
+        }
+        Effect::Textured(number) => {
+            let key = textured_keys()[number as usize];
+            keep_textures(scene, |t| t.key.key != key);
+            "its largest value all over"
+        }
         Effect::Emission => {
             for material in &mut scene.materials {
                 material.emission = DVec3::ZERO;
+                material.textures.retain(|t| t.key.key != EMISSION);
             }
             "lamps that are off"
         }
@@ -158,8 +177,17 @@ fn change(
 fn replace(scene: &mut Scene, other: impl Fn(&MaterialKind) -> Option<MaterialKind>) {
     for material in &mut scene.materials {
         if let Some(kind) = other(&material.kind) {
+            let kept = |t: &Textured| texturable_key(kind.name(), t.key.key) == Some(t.key);
+            material.textures.retain(kept);
             material.kind = kind;
         }
+    }
+}
+
+/// Leaves the other textures' largest values, which their materials have.
+fn keep_textures(scene: &mut Scene, is_kept: impl Fn(&Textured) -> bool) {
+    for material in &mut scene.materials {
+        material.textures.retain(&is_kept);
     }
 }
 

@@ -39,7 +39,12 @@ fn check(effect: Effect) -> Told<()> {
         | Effect::Table
         | Effect::Mis
         | Effect::Roulette => Err("linked in, it would be in use".into()),
-        Effect::Gradient | Effect::Sky => Err("it is made of what the scene has not".into()),
+        Effect::Gradient
+        | Effect::Sky
+        | Effect::TextureChecker
+        | Effect::TextureNoise
+        | Effect::TextureImage
+        | Effect::Textured(_) => Err("it is made of what the scene has not".into()),
         _ => Ok(()),
     }
 }

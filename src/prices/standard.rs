@@ -1,5 +1,7 @@
 //! The standard scene of an effect: one ball, and whatever calls for the effect.
 
+use std::sync::Arc;
+
 use glam::DVec3;
 
 use crate::effects::Effect;
@@ -8,10 +10,11 @@ use crate::materials::{
     ALL, MaterialKind,
     dielectric::{Dielectric, Glass},
     forms,
+    texturable::{texturable_key, textured_keys},
 };
 use crate::scene::builtin;
 use crate::scene::load::load_str;
-use crate::scene::{Environment, Gradient, Scene, Sky, Sphere};
+use crate::scene::{Environment, Gradient, Scene, Sky, Sphere, Texture, TextureImage};
 use crate::settings::{
     DEFAULT_TERMINATION, GeometryChoice, Integrator, LightSampling, Offset, Settings, View,
 };
@@ -97,6 +100,21 @@ pub fn standard(effect: Effect) -> (Scene, Settings) {
                 ..Dielectric::smooth(1.5)
             },
         ),
+        Effect::TextureChecker => set_texture(&mut scene, "albedo", checker),
+        Effect::TextureNoise => set_texture(&mut scene, "albedo", |values| Texture::Noise {
+            values,
+            size: 0.5,
+            octaves: 4,
+        }),
+        Effect::TextureImage => set_texture(&mut scene, "albedo", |[a, b]| {
+            let texels = (0..64).map(|i| if i % 2 == 0 { a } else { b });
+            let texels = texels.map(|v| v.as_vec3().to_array()).collect();
+            let image = Arc::new(Picture::new(8, 8, texels));
+            Texture::Image(TextureImage::new("stripes", image, false, DVec3::Y))
+        }),
+        Effect::Textured(number) => {
+            set_texture(&mut scene, textured_keys()[number as usize], checker);
+        }
         Effect::Gradient => {
             scene.environment = Some(Environment::Gradient(Gradient {
                 zenith: DVec3::splat(0.6),
@@ -139,6 +157,26 @@ pub fn standard(effect: Effect) -> (Scene, Settings) {
 /// The material of the ball.
 fn set_ball(scene: &mut Scene, kind: impl Into<MaterialKind>) {
     scene.materials[scene.spheres[0].material].kind = kind.into();
+}
+
+/// A texture for a key of the ball, whose material becomes the first of the test cases that has the key.
+fn set_texture(scene: &mut Scene, key: &str, texture: impl Fn([DVec3; 2]) -> Texture) {
+    let ball = &mut scene.materials[scene.spheres[0].material];
+    let mut cases = ALL.iter().flat_map(|material| (material.cases)());
+    let texturable = |kind: &MaterialKind| texturable_key(kind.name(), key);
+    if texturable(&ball.kind).is_none()
+        && let Some(kind) = cases.find(|kind| texturable(kind).is_some())
+    {
+        ball.kind = kind;
+    }
+    if let Some(key) = texturable(&ball.kind) {
+        let values = [0.25, 0.5].map(DVec3::splat);
+        *ball = ball.clone().with_texture(key, texture(values));
+    }
+}
+
+fn checker(values: [DVec3; 2]) -> Texture {
+    Texture::Checker { values, size: 0.5 }
 }
 
 /// A square of small balls in the place of the ball.

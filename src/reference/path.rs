@@ -15,11 +15,12 @@ use super::scene::camera::camera_ray;
 use super::scene::priority::{Media, cross_surface, filling, index_within, relative_index};
 use super::scene::ray::{Hit, Ray, Vertex, leave, vertex_at};
 use super::scene::sphere::closest_hit;
+use super::scene::texture::{TexturePoint, emission_at, kind_at};
 use crate::film::{AovSums, LightClass};
 use crate::materials::{BsdfSample, Event, MaterialKind, Surface, sample_uniform};
 use crate::placement::{Medium, Placement, SkyTable};
 use crate::sampler::Sampler;
-use crate::scene::{Environment, Material, Scene, Sky};
+use crate::scene::{Environment, Scene, Sky};
 use crate::settings::{Integrator, Settings, stream_words};
 
 /// Survival is the largest component of the throughput over 1/4.
@@ -147,37 +148,41 @@ impl PathTracer<'_> {
         };
         let sphere = &self.placement.spheres[hit.index];
         let material = &self.scene.materials[sphere.material];
+        let vertex = vertex_at(&path.ray, &hit, sphere);
+        let point = self.point_at(&hit, &vertex);
+        let kind = kind_at(material, &point);
+        let kind = &*kind;
         let share = self.share_of_emission(&path.ray, &hit, path.departure);
-        path.receive(path.class, path.throughput * share * material.emission);
-        self.keep_wavelength(path, &material.kind, random);
+        let emission = emission_at(material, &point);
+        path.receive(path.class, path.throughput * share * emission);
+        self.keep_wavelength(path, kind, random);
         let vertex = Vertex {
-            both_sides: material.kind.is_translucent(),
-            ..vertex_at(&path.ray, &hit, sphere)
+            both_sides: kind.is_translucent(),
+            ..vertex
         };
         if path.found.bounces == 0 {
-            self.see(path, &hit, &vertex, material);
+            self.see(path, &hit, &vertex, kind);
         }
         if path.found.bounces == self.settings.max_bounces {
             path.found.cut = path.throughput.abs();
             return false;
         }
         let u = random(scattering(path.found.bounces));
-        let ior = index_at(&material.kind, path.wavelength);
+        let ior = index_at(kind, path.wavelength);
         let media = &path.ray.media;
         let surface = Surface {
             normal: vertex.normal,
-            eta: if material.kind.transmits() {
+            eta: if kind.transmits() {
                 relative_index(media, sphere.level, ior, hit.inside)
             } else {
                 1.0 / index_within(media)
             },
-            offset: sphere.anchor_offset(self.placement.scale)
-                + vertex.offset / self.placement.scale,
+            offset: point.offset,
         };
         let wo = -path.ray.direction;
         if self.samples_lamps() || self.sky().is_some() {
             let v = random(lighting(path.found.bounces));
-            let direct = self.direct_light(path, &hit, &vertex, &surface, v);
+            let direct = self.direct_light(path, &hit, &vertex, (kind, &surface), v);
             let class = direct
                 .event
                 .map_or(path.class, |e| next_class(path.class, e));
@@ -185,8 +190,22 @@ impl PathTracer<'_> {
             path.found.rays += direct.rays;
             path.departure.pdf_per_weight = direct.pdf_per_weight;
         }
-        let s = self.sample(&material.kind, &surface, wo, u);
+        let s = self.sample(kind, &surface, wo, u);
         self.go_on(path, &hit, &vertex, &s, u[3])
+    }
+
+    /// Where on its sphere a vertex is.
+    fn point_at(&self, hit: &Hit, vertex: &Vertex) -> TexturePoint {
+        let sphere = &self.placement.spheres[hit.index];
+        let scale = self.placement.scale;
+        TexturePoint {
+            offset: sphere.anchor_offset(scale) + vertex.offset / scale,
+            normal: if hit.inside {
+                -vertex.normal
+            } else {
+                vertex.normal
+            },
+        }
     }
 
     /// What is left of light after a length `t` in what fills the space, `None` for infinitely far.
@@ -199,12 +218,12 @@ impl PathTracer<'_> {
     }
 
     /// Takes note of what is seen first.
-    fn see(&self, path: &mut Path, hit: &Hit, vertex: &Vertex, material: &Material) {
+    fn see(&self, path: &mut Path, hit: &Hit, vertex: &Vertex, kind: &MaterialKind) {
         let camera = &self.placement.camera;
         let depth = hit.t * path.ray.direction.dot(camera.forward);
         let aovs = &mut path.found.aovs;
         aovs.normal = vertex.normal.to_array();
-        aovs.albedo = material.kind.color().to_array();
+        aovs.albedo = kind.color().to_array();
         aovs.depth = (camera.approach + depth) / self.placement.scale;
         aovs.hits = 1.0;
     }
@@ -387,14 +406,12 @@ impl PathTracer<'_> {
         path: &Path,
         hit: &Hit,
         vertex: &Vertex,
-        surface: &Surface,
+        (kind, surface): (&MaterialKind, &Surface),
         u: [f64; 4],
     ) -> Direct {
         let mut direct = Direct::default();
         let ray = &path.ray;
         let spheres = &self.placement.spheres;
-        let material = |index: usize| &self.scene.materials[spheres[index].material];
-        let kind = &material(hit.index).kind;
         if kind.is_delta() {
             return direct;
         }
@@ -434,7 +451,17 @@ impl PathTracer<'_> {
         let radiance = if s.sphere == NO_SPHERE {
             environment_radiance(self.scene, s.wi)
         } else {
-            material(s.sphere).emission
+            // Where f32 or a rounding lets the ray miss the limb, it is there.
+            let met = Hit {
+                t: first
+                    .filter(|first| first.index == s.sphere)
+                    .map_or(s.limb, |first| first.t),
+                index: s.sphere,
+                inside: false,
+            };
+            let vertex = vertex_at(&shadow, &met, &spheres[s.sphere]);
+            let lamp = &self.scene.materials[spheres[s.sphere].material];
+            emission_at(lamp, &self.point_at(&met, &vertex))
         };
         direct.radiance = share / s.pdf * f.f_cos * radiance;
         let length = match first.filter(|first| first.index == s.sphere) {

@@ -6,11 +6,15 @@ use std::fmt::{self, Write};
 use glam::DVec3;
 
 use super::load::Loaded;
-use super::{Environment, Gradient, Handedness, Scene};
+use super::{Environment, Gradient, Handedness, Scene, Texture, Textured};
+use crate::materials::texturable::EMISSION;
 use crate::numbers::significant;
 
 /// So many lights are listed one by one.
 const LIGHTS_LISTED: usize = 8;
+
+/// And so many textures.
+const TEXTURES_LISTED: usize = 16;
 
 /// The summary that `scene check` prints: image, camera, spheres by material, lights. Lines end
 /// with a newline; the warnings are not in it.
@@ -58,7 +62,39 @@ fn write(text: &mut String, loaded: &Loaded) -> fmt::Result {
             counted(materials, "material")
         )?;
     }
+    textures(text, scene)?;
     lights(text, scene)
+}
+
+fn textures(text: &mut String, scene: &Scene) -> fmt::Result {
+    let all = scene.materials.iter();
+    let all: Vec<_> = all
+        .flat_map(|material| material.textures.iter().map(move |t| (&material.name, t)))
+        .collect();
+    if all.is_empty() {
+        return Ok(());
+    }
+    writeln!(text, "textures     {}", all.len())?;
+    for (name, Textured { key, texture }) in all.iter().take(TEXTURES_LISTED) {
+        let what = match texture {
+            Texture::Checker { size, .. } => format!("a checker of cells of {size}"),
+            Texture::Noise { size, octaves, .. } => {
+                format!(
+                    "a noise of cells of {size}, {}",
+                    counted(u64::from(*octaves), "octave")
+                )
+            }
+            Texture::Image(image) => {
+                let (picture, name) = (image.image(), image.name().escape_debug());
+                format!("{name}, {} x {} texels", picture.width, picture.height)
+            }
+        };
+        writeln!(text, "  {} of {name}: {what}", key.key)?;
+    }
+    if all.len() > TEXTURES_LISTED {
+        writeln!(text, "  and {} more", all.len() - TEXTURES_LISTED)?;
+    }
+    Ok(())
 }
 
 fn camera(text: &mut String, scene: &Scene) -> fmt::Result {
@@ -107,9 +143,13 @@ fn lights(text: &mut String, scene: &Scene) -> fmt::Result {
         let material = &scene.materials[index];
         let emission = triple(material.emission);
         let spheres = counted(count, "sphere");
+        let up_to = match material.texture(EMISSION) {
+            Some(_) => "up to ",
+            None => "",
+        };
         writeln!(
             text,
-            "  {} with radiance {emission}: {spheres}",
+            "  {} with radiance {up_to}{emission}: {spheres}",
             material.name
         )?;
     }

@@ -15,7 +15,7 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 use toml::Spanned;
 
-use crate::materials::schema::{MAX_MAGNITUDE, radiance, vector};
+use crate::materials::schema::{MAX_MAGNITUDE, axis, radiance, texture, vector};
 use crate::materials::{self, MaterialKind, diffuse, schemas};
 use crate::particles::Format;
 use crate::scene::particles::Map;
@@ -210,12 +210,20 @@ impl JsonSchema for MaterialTable {
             "description".into(),
             json!("Radiance emitted on both sides of the surface."),
         );
+        texture(&mut emission);
+        let mut common_axis = axis(generator);
+        common_axis.insert(
+            "description".into(),
+            json!("The axis about which images are on spheres."),
+        );
         let with_common = |(name, mut schema): (&str, Schema)| {
             let object = schema.ensure_object();
             let properties = object.get_mut("properties");
             if let Some(properties) = properties.and_then(Value::as_object_mut) {
                 properties.insert("type".into(), json!({ "type": "string", "const": name }));
                 properties.insert("emission".into(), emission.as_value().clone());
+                let axis = properties.entry("axis");
+                axis.or_insert_with(|| common_axis.as_value().clone());
             }
             let required = object.entry("required").or_insert(json!([]));
             if let Some(required) = required.as_array_mut() {

@@ -8,7 +8,7 @@ use std::path::Path;
 use fnv::FnvHasher;
 use glam::DVec3;
 
-use super::{Environment, Gradient, Handedness, Scene};
+use super::{Environment, Gradient, Handedness, Scene, Texture, Textured};
 use crate::image::Picture;
 use crate::materials::{MaterialKind, Value};
 
@@ -47,6 +47,9 @@ pub fn content_hash(scene: &Scene) -> String {
         let material = &scene.materials[sphere.material];
         hash.vector(material.emission);
         hash.kind(&material.kind);
+        for textured in &material.textures {
+            hash.texture(textured);
+        }
     }
     format!("{:016x}", hash.0.finish())
 }
@@ -120,6 +123,34 @@ impl Fnv {
         self.bytes(&image.height.to_le_bytes());
         for value in image.pixels.as_flattened() {
             self.bytes(&value.to_bits().to_le_bytes());
+        }
+    }
+
+    fn texture(&mut self, Textured { key, texture }: &Textured) {
+        self.bytes(key.key.as_bytes());
+        match texture {
+            Texture::Checker { values, size } => {
+                self.bytes(b"checker");
+                self.vector(values[0]);
+                self.vector(values[1]);
+                self.number(*size);
+            }
+            Texture::Noise {
+                values,
+                size,
+                octaves,
+            } => {
+                self.bytes(b"noise");
+                self.vector(values[0]);
+                self.vector(values[1]);
+                self.number(*size);
+                self.bytes(&octaves.to_le_bytes());
+            }
+            Texture::Image(image) => {
+                self.bytes(b"image");
+                self.vector(image.axis());
+                self.image(image.image());
+            }
         }
     }
 

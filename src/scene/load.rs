@@ -14,7 +14,7 @@ use toml::de::{DeTable, Deserializer};
 use super::file::{SceneFile, json_schema};
 use super::particles::look::Look;
 use super::report::{Problem, Report};
-use super::{Scene, content_hash, pieces, shape, validate};
+use super::{Scene, content_hash, pieces, shape, texture_table, validate};
 use crate::error::{Action, Error, Result};
 
 /// The largest scene file that is read, in bytes; about three million spheres.
@@ -220,12 +220,12 @@ fn parse(text: &str, place: Place<'_>, report: &mut Report) -> Option<Parsed> {
     static SCHEMA: LazyLock<serde_json::Value> = LazyLock::new(json_schema);
 
     if text.len() >= LONG
-        && let Some((file, keys)) = pieces::parse(text, &SCHEMA)
+        && let Some((file, keys, textures)) = pieces::parse(text, &SCHEMA)
     {
-        return validate::scene(file, &keys, place, report);
+        return validate::scene(file, &keys, textures, place, report);
     }
     let root = DeTable::parse(text).map_err(|error| report.errors.push(syntax(&error)));
-    let root = root.ok()?;
+    let mut root = root.ok()?;
     if root.get_ref().is_empty() {
         let problem = Problem::new(0..0, "the scene file is empty", "");
         report.errors.push(problem.help(
@@ -239,9 +239,10 @@ fn parse(text: &str, place: Place<'_>, report: &mut Report) -> Option<Parsed> {
         return None;
     }
     let keys = validate::material_keys(root.get_ref());
+    let textures = texture_table::take(root.get_mut());
     let file = SceneFile::deserialize(Deserializer::from(root))
         .map_err(|error| report.errors.push(syntax(&error)));
-    validate::scene(file.ok()?, &keys, place, report)
+    validate::scene(file.ok()?, &keys, textures, place, report)
 }
 
 /// An error of the TOML parser, in words for those who know other formats. It has a text and a place, and

@@ -11,6 +11,7 @@ mod file;
 mod hash;
 mod image;
 pub mod load;
+pub mod material;
 pub mod particles;
 mod pieces;
 #[cfg(test)]
@@ -19,6 +20,8 @@ mod range;
 mod report;
 mod shape;
 mod suggest;
+pub mod texture;
+mod texture_table;
 mod validate;
 
 pub use describe::summary;
@@ -26,10 +29,10 @@ pub use environment::{Environment, Gradient, Sky};
 pub use file::{MAX_BOUNCES, MAX_SIDE, MAX_SPP, json_schema};
 pub use hash::{content_hash, file_hash};
 pub use load::Loaded;
+pub use material::Material;
+pub use texture::{Texture, TextureImage, Textured};
 
 use glam::DVec3;
-
-use crate::materials::MaterialKind;
 
 /// A validated scene. Built by the scene loader (`scene::load`) or from the gallery
 /// (`scene::builtin`).
@@ -86,17 +89,6 @@ pub enum Handedness {
     Right,
     /// Image right is up × forward.
     Left,
-}
-
-/// A named material.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Material {
-    /// The name by which spheres refer to it.
-    pub name: String,
-    /// How it scatters light.
-    pub kind: MaterialKind,
-    /// Radiance emitted on both sides of the surface; zero for most materials.
-    pub emission: DVec3,
 }
 
 /// A sphere.

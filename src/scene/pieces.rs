@@ -15,6 +15,7 @@ use toml::de::{DeTable, Deserializer};
 use super::file::{SceneFile, SphereTable};
 use super::report::Report;
 use super::shape;
+use super::texture_table::{self, Textures};
 use super::validate::{MaterialKeys, material_keys};
 
 /// Before each sphere.
@@ -29,23 +30,26 @@ struct Piece {
     sphere: Vec<SphereTable>,
 }
 
-/// What the file holds, and where the keys of its materials are; `None` if it is to be parsed as a whole.
-pub(super) fn parse(text: &str, schema: &serde_json::Value) -> Option<(SceneFile, MaterialKeys)> {
+/// What a file holds, where the keys of its materials are, and their textures.
+type Parts = (SceneFile, MaterialKeys, Textures);
+
+/// That of a file; `None` if it is to be parsed as a whole.
+pub(super) fn parse(text: &str, schema: &serde_json::Value) -> Option<Parts> {
     parse_by(SPHERES, text, schema)
 }
 
-fn parse_by(
-    spheres: usize,
-    text: &str,
-    schema: &serde_json::Value,
-) -> Option<(SceneFile, MaterialKeys)> {
+fn parse_by(spheres: usize, text: &str, schema: &serde_json::Value) -> Option<Parts> {
     let starts = starts(text)?;
-    let head = DeTable::parse(&text[..*starts.first()?]).ok()?;
+    let mut head = DeTable::parse(&text[..*starts.first()?]).ok()?;
     if head.get_ref().contains_key("sphere") {
         return None;
     }
     let keys = material_keys(head.get_ref());
-    let mut file: SceneFile = checked(head, schema)?;
+    if !is_right(head.get_ref(), schema) {
+        return None;
+    }
+    let textures = texture_table::take(head.get_mut());
+    let mut file = SceneFile::deserialize(Deserializer::from(head)).ok()?;
     let count = starts.len();
     let pieces: Option<Vec<Vec<SphereTable>>> = (0..count.div_ceil(spheres))
         .into_par_iter()
@@ -58,7 +62,7 @@ fn parse_by(
         .collect();
     file.sphere.reserve_exact(count);
     file.sphere.extend(pieces?.into_iter().flatten());
-    Some((file, keys))
+    Some((file, keys, textures))
 }
 
 /// Where the spheres begin; `None` if anything but spheres follows the first.
@@ -113,12 +117,16 @@ fn checked<T: for<'de> Deserialize<'de>>(
     root: Spanned<DeTable<'_>>,
     schema: &serde_json::Value,
 ) -> Option<T> {
-    let mut report = Report::default();
-    shape::check(root.get_ref(), schema, &mut report);
-    if !report.errors.is_empty() || !report.warnings.is_empty() {
+    if !is_right(root.get_ref(), schema) {
         return None;
     }
     T::deserialize(Deserializer::from(root)).ok()
+}
+
+fn is_right(root: &DeTable<'_>, schema: &serde_json::Value) -> bool {
+    let mut report = Report::default();
+    shape::check(root, schema, &mut report);
+    report.errors.is_empty() && report.warnings.is_empty()
 }
 
 #[cfg(test)]
@@ -145,7 +153,7 @@ albedo = [0.5, 0.5, 0.5]
     /// By pieces of two spheres, and as a whole.
     fn both(text: &str) -> (Option<String>, Option<String>) {
         let schema = json_schema();
-        let pieces = parse_by(2, text, &schema).map(|(file, keys)| {
+        let pieces = parse_by(2, text, &schema).map(|(file, keys, _)| {
             let mut keys: Vec<_> = keys.into_iter().map(|k| format!("{k:?}")).collect();
             keys.sort();
             format!("{file:?} {keys:?}")

@@ -190,9 +190,8 @@ fn scene() -> impl Strategy<Value = Scene> {
                 .into_iter()
                 .enumerate()
                 .map(|(index, (name, kind, emission))| Material {
-                    name: format!("{name}{index}"),
-                    kind,
                     emission,
+                    ..Material::new(&format!("{name}{index}"), kind)
                 })
                 .collect();
             let spheres = spheres

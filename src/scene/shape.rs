@@ -144,15 +144,17 @@ fn check_value(
     report: &mut Report,
 ) {
     let kind = match schema["type"].as_array() {
-        // A number, or a word, or an array.
+        // A number, or a word, or an array, or a table.
         Some(kinds) => kinds
             .iter()
             .filter_map(Value::as_str)
             .find(|kind| match value.get_ref() {
                 DeValue::String(_) => *kind == "string",
                 DeValue::Array(_) => *kind == "array",
+                DeValue::Table(_) => *kind == "object",
                 _ => *kind == "number",
             })
+            .or(kinds[0].as_str())
             .unwrap_or("number"),
         None => schema["type"].as_str().unwrap_or("object"),
     };
@@ -262,6 +264,8 @@ fn length(name: &str, span: Range<usize>, length: usize, schema: &Value, report:
     };
     if length as u64 != wanted {
         let what = match schema["items"]["minItems"].as_u64() {
+            // Of a texture.
+            Some(_) if wanted == 2 => "values",
             Some(_) => "rows",
             None => "numbers",
         };
@@ -290,7 +294,8 @@ fn missing_key(key: &str, schema: &Value, place: &Place) -> Problem {
     let message = format!("`{key}` is missing in {}", place.name);
     let problem = Problem::new(place.header.clone(), message, "");
     let description = schema["description"].as_str().unwrap_or_default();
-    let example = match schema["type"].as_str() {
+    let kind = schema["type"].as_str().or(schema["type"][0].as_str());
+    let example = match kind {
         Some("object") => {
             let inner = schema["required"].as_array();
             let inner = inner.into_iter().flatten().filter_map(Value::as_str);

@@ -12,6 +12,7 @@ use super::load::{Parsed, Place};
 use super::particles;
 use super::report::{Problem, Report, SHOWN};
 use super::suggest::{list, nearest};
+use super::texture_table::{self, Textures};
 use super::{Camera, Handedness, Material, RenderDefaults, Scene, Sphere, environment};
 use crate::materials::Mistake;
 
@@ -46,6 +47,7 @@ pub(super) fn material_keys(root: &DeTable<'_>) -> MaterialKeys {
 pub(super) fn scene(
     file: SceneFile,
     keys: &MaterialKeys,
+    textures: Textures,
     place: Place<'_>,
     report: &mut Report,
 ) -> Option<Parsed> {
@@ -176,6 +178,13 @@ pub(super) fn scene(
             .push(problem.help(format!("one of them must have at least {SHORTEST:e}")));
     }
 
+    texture_table::apply(
+        textures,
+        &mut materials[..own],
+        place.folder,
+        &mut files,
+        report,
+    );
     let environment = file.environment.as_ref();
     let environment = environment
         .and_then(|table| environment::of_table(table, place.folder, &mut files, report));
@@ -330,9 +339,8 @@ pub(super) fn vector(values: [f64; 3]) -> DVec3 {
 
 fn material(name: String, table: MaterialTable) -> Material {
     Material {
-        name,
-        kind: table.kind,
         emission: table.emission + 0.0,
+        ..Material::new(&name, table.kind)
     }
 }
 
@@ -381,7 +389,7 @@ fn warn(scene: &Scene, spans: &[Range<usize>], used: &BTreeSet<usize>, report: &
             );
             warnings.push(Problem::new(span.clone(), message, ""));
         }
-        if let Some([what, help]) = material.kind.warning() {
+        if let Some([what, help]) = material.warning() {
             let message = format!("material \"{}\" {what}", material.name.escape_debug());
             warnings.push(Problem::new(span.clone(), message, "").help(help));
         }

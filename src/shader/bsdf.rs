@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use super::textures;
 use crate::effects::{Effect, Effects};
 use crate::materials::{Form, Member, MemberKind};
 
@@ -36,6 +37,7 @@ pub fn members(effects: &Effects) -> Vec<Member> {
             }
         }
     }
+    own.extend(textures::members(effects));
     let (vectors, scalars): (Vec<Member>, Vec<Member>) =
         own.into_iter().partition(|m| m.kind == MemberKind::Vector);
     let mut members = vec![Member::vector("color"), Member::word("kind")];
@@ -82,6 +84,9 @@ pub(super) fn module(effects: &Effects) -> String {
             );
         }
     }
+    if effects.has_textures() {
+        text += &textures::imports(effects);
+    }
     text += "struct Material {\n";
     for member in members(effects) {
         let ty = match member.kind {
@@ -119,6 +124,9 @@ pub(super) fn module(effects: &Effects) -> String {
         "return BsdfValue(vec3f(0.0), 0.0, 0u);",
     );
     text += "}\n";
+    if effects.has_textures() {
+        text += &textures::with_textures(effects);
+    }
     text += &predicate("is_delta", &forms, |form| form.delta);
     text += &predicate("transmits", &forms, |form| form.transmits);
     text += &predicate("is_translucent", &forms, Form::is_translucent);

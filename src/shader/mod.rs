@@ -8,6 +8,7 @@ mod bsdf;
 mod names;
 mod sources;
 pub mod steps;
+pub(crate) mod textures;
 mod without;
 
 pub use bsdf::members as material_members;
@@ -20,6 +21,7 @@ use crate::bvh;
 use crate::effects::{Effect, Effects, Role};
 use crate::error::{Error, Result};
 use crate::gpu::layout::{SKY_TABLE_WIDTH, anchored_spheres};
+use crate::gpu::textures::{IMAGE_WIDTH, TextureTable};
 use crate::materials;
 use crate::placement::{Medium, Placement};
 use crate::scene::{Environment, Scene};
@@ -258,9 +260,18 @@ fn config(scene: &Scene, placement: &Placement, effects: &Effects) -> String {
         "const RAY_STEPS: u32 = {}u;\n",
         steps::vertex_steps(placement, effects)
     );
-    if effects.looks_at_offset() {
+    if effects.looks_at_offset() || effects.has_textures() {
         let unit = baked::number(1.0 / placement.scale);
         text += &format!("const SCENE_UNIT: f32 = {unit};\n");
+    }
+    if effects.has_textures() {
+        let table = TextureTable::new(scene, placement);
+        text += &format!(
+            "const PATTERN_COUNT: u32 = {}u;\nconst IMAGE_COUNT: u32 = {}u;\n\
+             const IMAGE_WIDTH: u32 = {IMAGE_WIDTH}u;\n",
+            table.patterns().len().max(1),
+            table.images().len().max(1)
+        );
     }
     text += &environment(scene, placement, effects);
     if effects.has(Effect::Lights) {

@@ -61,4 +61,5 @@ sources![
     "scene/ray",
     "scene/sphere",
     "scene/surface",
+    "scene/texture",
 ];

@@ -13,6 +13,7 @@
 //! `shaders/path.wesl`); if they do not, it is no sample, and the next dispatch begins it again.
 
 use crate::effects::{Effect, Effects};
+use crate::materials::schema::MOST_OCTAVES;
 use crate::placement::Placement;
 
 /// The most loop iterations that an invocation is to make in one dispatch: below the 65535 after which
@@ -34,7 +35,7 @@ pub struct Loop {
 }
 
 /// All loops of the path tracer's kernel.
-pub const LOOPS: [Loop; 9] = [
+pub const LOOPS: [Loop; 10] = [
     // Over vertices.
     Loop {
         function: "render",
@@ -90,6 +91,17 @@ pub const LOOPS: [Loop; 9] = [
             // By `sample`, with the lecture's integrator by `share` and `evaluate`; and for a light.
             let lecture = usize::from(effects.has(Effect::Lecture));
             (rays(effects) + lecture) * (27 + 1)
+        },
+    },
+    // Over the octaves of a noise.
+    Loop {
+        function: "noise_value",
+        used: |effects| effects.has(Effect::TextureNoise),
+        at_vertex: |_, effects| {
+            // Each key once, and what a light emits.
+            let lookups =
+                effects.textured_keys().count() + usize::from(effects.has(Effect::Lights));
+            lookups * (MOST_OCTAVES as usize + 1)
         },
     },
     // Over the lights that are weighed.

@@ -9,6 +9,7 @@ pub(in crate::materials) const FORMS: &[Form] = &[
     Form {
         name: "car_paint",
         what: "car paint: Lambert and three Cook-Torrance lobes",
+        derives: Some(&[]),
         members: &[
             Member::vector("diffuse"),
             Member::vector("specular1"),
@@ -24,6 +25,7 @@ pub(in crate::materials) const FORMS: &[Form] = &[
         what: "the same with a clear coat in the place of the third lobe",
         part_delta: true,
         relative: true,
+        derives: Some(&[]),
         members: &[
             Member::vector("diffuse"),
             Member::vector("specular1"),
@@ -39,6 +41,7 @@ pub(in crate::materials) const FORMS: &[Form] = &[
         what: "car paint with flakes",
         offset: true,
         anchored: &FLAKE_ANCHOR,
+        derives: Some(&[]),
         members: &[
             Member::vector("diffuse"),
             Member::vector("specular1"),
@@ -61,6 +64,7 @@ pub(in crate::materials) const FORMS: &[Form] = &[
         relative: true,
         offset: true,
         anchored: &FLAKE_ANCHOR,
+        derives: Some(&[]),
         members: &[
             Member::vector("diffuse"),
             Member::vector("specular1"),

@@ -41,7 +41,7 @@ pub struct CarPaint {
     pub specular: Option<[DVec3; 3]>,
     /// Fresnel reflectance of the lobes at normal incidence.
     #[serde(default)]
-    #[schemars(schema_with = "schema::share")]
+    #[schemars(schema_with = "schema::plain_share")]
     pub f0: Option<DVec3>,
     /// Widths of the lobes: root mean square slopes of Beckmann facets.
     #[serde(default)]
@@ -68,7 +68,7 @@ pub enum Preset {
 fn colors(generator: &mut SchemaGenerator) -> Schema {
     schemars::json_schema!({
         "type": "array",
-        "items": schema::share(generator),
+        "items": schema::plain_share(generator),
         "minItems": 3,
         "maxItems": 3,
     })

@@ -5,3 +5,4 @@ pub mod camera;
 pub mod priority;
 pub mod ray;
 pub mod sphere;
+pub mod texture;

@@ -212,13 +212,12 @@ fn scene(cloud: Cloud, view: &View, background: DVec3) -> Scene {
         material: materials.len(),
         priority: None,
     });
+    let black = Diffuse {
+        albedo: DVec3::ZERO,
+    };
     materials.push(Material {
-        name: "lamp".into(),
-        kind: Diffuse {
-            albedo: DVec3::ZERO,
-        }
-        .into(),
         emission: DVec3::splat(radiance),
+        ..Material::new("lamp", black.into())
     });
     Scene {
         camera,

@@ -163,11 +163,7 @@ pub(in crate::scene) fn colored<'w>(
         let kind = materials::ALL
             .iter()
             .find(|material| material.name == wanted)?;
-        Some(Material {
-            name,
-            kind: kind.of_color(color)?,
-            emission: glam::DVec3::ZERO,
-        })
+        Some(Material::new(&name, kind.of_color(color)?))
     })
 }
 

@@ -15,8 +15,10 @@ use glam::DVec3;
 use crate::error::Result;
 use crate::gpu::bsdf_probe::{BsdfInput, BsdfProbe, Evaluated, Sampled};
 use crate::gpu::device::Gpu;
+use crate::materials::Value;
 use crate::materials::dielectric::fresnel;
 use crate::materials::{ALL, BsdfSample, BsdfValue, MaterialKind, Surface, sample_uniform};
+use crate::scene::{Material, Texture};
 use crate::settings::Integrator;
 use crate::verify::{Random, ULP};
 
@@ -46,6 +48,28 @@ impl Subjects {
         Ok(Self {
             probe: BsdfProbe::new(gpu, &kinds, integrator)?,
             lecture: matches!(integrator, Integrator::Lecture { .. }),
+            kinds,
+        })
+    }
+
+    /// All cases of all materials, on the device with textures of one value each for all that may be one: a record
+    /// of other values, in whose place these come. Without textures, `with_textures` being false, the other values
+    /// are what it has.
+    ///
+    /// # Errors
+    /// If the device fails.
+    pub fn textured(gpu: &Gpu, with_textures: bool) -> Result<Self> {
+        let kinds: Vec<MaterialKind> = ALL.iter().flat_map(|material| (material.cases)()).collect();
+        let materials = kinds.iter().map(|kind| match with_textures {
+            true => disguised(kind),
+            false => Material {
+                textures: Vec::new(),
+                ..disguised(kind)
+            },
+        });
+        Ok(Self {
+            probe: BsdfProbe::of(gpu, materials.collect(), Integrator::Bsdf)?,
+            lecture: false,
             kinds,
         })
     }
@@ -151,6 +175,30 @@ impl Subjects {
         }
         inputs
     }
+}
+
+/// A material that is this one by its textures, and another one without.
+fn disguised(kind: &MaterialKind) -> Material {
+    let mut material = Material::new("disguised", kind.clone());
+    let mut others = Vec::new();
+    for key in kind.form().texturable() {
+        let own = kind
+            .parameters()
+            .into_iter()
+            .find(|(name, _)| *name == key.key);
+        let (value, other) = match own.map(|(_, value)| value) {
+            Some(Value::Vector(v)) => (v, Value::Vector(0.25 + 0.5 * (1.0 - v))),
+            Some(Value::Number(x)) if x >= 0.5 => (DVec3::splat(x), Value::Number(0.33)),
+            Some(Value::Number(x)) => (DVec3::splat(x), Value::Number(0.77)),
+            // What is 0 need not be said.
+            _ => (DVec3::ZERO, Value::Number(0.77)),
+        };
+        let (values, size) = ([value; 2], 0.5);
+        material = material.with_texture(key, Texture::Checker { values, size });
+        others.push((key.key, other));
+    }
+    material.kind = kind.with(&others);
+    material
 }
 
 /// A question as the twin takes it: the numbers of a [`BsdfInput`].
