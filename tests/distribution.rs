@@ -12,6 +12,7 @@ use crate::common::{gpu, probe, probe_of, scene};
 use crate::thorough::thorough;
 use bytemuck::Pod;
 use glam::{DVec2, DVec3};
+use gpu_trace::gpu::bsdf_probe::Sampled;
 use gpu_trace::gpu::probe::Probe;
 use gpu_trace::materials::dielectric::{Dielectric, fresnel};
 use gpu_trace::materials::{Event, MaterialKind};
@@ -105,6 +106,9 @@ const DRAWN: usize = 300_000;
 const CASES: usize = 3;
 const UNIFORM_CASES: usize = 1;
 
+/// So few samples beside a delta lobe that a normal turned by a tenth is not seen in a cosine of them.
+const FEW: usize = 10_000;
+
 const LECTURE: Integrator = Integrator::Lecture { termination: 0.2 };
 
 /// What is asked of a draw by all tests, so that it is drawn once.
@@ -114,7 +118,9 @@ struct Found {
     name: String,
     /// p-values of the twin's pdf, and of one that is wrong.
     right: f64,
-    wrong: Option<f64>,
+    wrong: f64,
+    /// Whether a coat reflects so much that hardly anything can be told of the rest.
+    few: bool,
     energy: Energy,
     /// Those of the material's own sampling.
     moments: Option<[[f64; 3]; 4]>,
@@ -147,15 +153,16 @@ fn found() -> &'static [Found] {
 
 impl Found {
     fn of(draw: &Draw<'_>, kind: MaterialKind, integrator: Integrator) -> Self {
-        // Companions that are not found: what has one lobe in one direction chooses nothing, and hardly anything does
-        // a coat that reflects nearly all.
-        let one_way = kind.is_delta() && !kind.transmits();
-        let chooses = !one_way && !draw.is_nearly_delta();
+        // A companion that is not found: what has one lobe in one direction chooses nothing.
+        let chooses = !kind.is_delta() || kind.transmits();
+        let delta = |s: &&Sampled| s.event & Event::DELTA.bits() != 0;
+        let beside = draw.samples().len() - draw.samples().iter().filter(delta).count();
         Self {
             integrator,
             name: draw.name().to_owned(),
             right: draw.follows(0.0).1,
-            wrong: chooses.then(|| draw.follows(0.1).1),
+            wrong: if chooses { draw.follows(0.1).1 } else { 1.0 },
+            few: kind.is_part_delta() && beside < FEW,
             energy: draw.energy(),
             moments: (integrator == Integrator::Bsdf).then(|| draw.moments()),
             peak: draw.peak(),
@@ -169,8 +176,8 @@ fn samples_follow_their_pdfs() {
     let mut outcomes = Vec::new();
     for draw in found() {
         let Found { name, wrong, .. } = draw;
-        let told = wrong.is_none_or(|p| p < sidak(100)) || draw.kind.is_delta();
-        assert!(told, "not found: {name}, p = {wrong:?}");
+        let told = *wrong < sidak(100) || draw.kind.is_delta() || draw.few;
+        assert!(told, "not found: {name}, p = {wrong:e}");
         outcomes.push((name.clone(), draw.right));
     }
     outcomes.extend(sphere());

@@ -198,14 +198,6 @@ impl<'a> Draw<'a> {
         (self.name.clone(), p)
     }
 
-    /// Whether so few samples are beside the delta lobe that hardly anything can be told of them.
-    #[must_use]
-    pub fn is_nearly_delta(&self) -> bool {
-        let beside = |s: &&Sampled| s.event & Event::DELTA.bits() == 0;
-        let few = self.samples.iter().filter(beside).count() < FEW as usize;
-        self.subjects.kinds[self.subject].is_part_delta() && few
-    }
-
     fn wrong_surface(&self, wrong: f64) -> Surface {
         let Surface {
             normal,
