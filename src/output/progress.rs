@@ -288,7 +288,7 @@ fn labelled(part: &str, snapshot: &Snapshot) -> String {
 /// As in `64/256 spp  0:12, 0:36 left  14.2 Mpaths/s  error 1.3 %`.
 impl std::fmt::Display for Snapshot {
     fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        if self.samples == 0 && self.spp == 0 {
+        if self.samples == 0 && self.spp == 0 && self.spp_total.is_none() {
             // Of work that is not counted in samples, or before there are any.
             write!(formatter, "{}", clock(self.elapsed))?;
             return match self.remaining {
