@@ -44,9 +44,9 @@ impl Trust {
 
     /// What speaks against the error; `heavy_tailed`: that its estimate has no finite variance is known of the scene.
     fn doubts(&self, heavy_tailed: bool) -> Vec<&'static str> {
-        // Written so that what is no number is doubtful.
-        let few = !(self.spread <= SPREAD);
-        let rare = !(self.correction.abs() <= CORRECTION);
+        // What is no number is doubtful.
+        let few = self.spread.is_nan() || self.spread > SPREAD;
+        let rare = self.correction.is_nan() || self.correction.abs() > CORRECTION;
         [
             (few, "few pixels have most of the error"),
             (rare, "pixels have met too little of their light"),
