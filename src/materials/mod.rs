@@ -70,7 +70,7 @@ pub trait Bsdf {
     /// Chooses where a path goes on, from uniform numbers.
     fn sample(&self, surface: &Surface, wo: DVec3, u: [f64; 4]) -> BsdfSample;
 
-    /// The probability of its delta lobe beside others: `sample` chooses it where u[2] is below.
+    /// The probability of its delta lobe beside others: `sample` chooses it where `u[2]` is below.
     fn delta_share(&self, _: &Surface, _: DVec3) -> f64 {
         0.0
     }
