@@ -8,9 +8,10 @@ use glam::{DVec3, Vec3};
 use gpu_trace::bvh::{Ball, MOST_SAH_LEVELS, NOTHING, Options, Tree, WIDTH};
 use gpu_trace::effects::Effects;
 use gpu_trace::gpu::probe::Probe;
+use gpu_trace::materials;
 use gpu_trace::placement::{Placement, Side};
 use gpu_trace::render::render_quietly;
-use gpu_trace::scene::Scene;
+use gpu_trace::scene::{Material, Scene};
 use gpu_trace::settings::{GeometryChoice, Settings};
 use gpu_trace::verify::{
     Crowd, EMPTY, Random, RayRows, Row, crowds, image_bits, settings, share_off, vector,
@@ -149,7 +150,12 @@ const GLASS: [&str; 3] = ["diffuse", "interior", "dielectric"];
 
 fn probe(placement: &Placement, form: &str, effects: &[&str]) -> Probe {
     let effects = Effects::named(&[effects, &[form]].concat());
-    Probe::new(&gpu(), &scene(EMPTY), placement, &effects).unwrap_or_else(|e| panic!("{e}"))
+    // The material that placed spheres name.
+    let mut scene = scene(EMPTY);
+    let gray = materials::ALL[0].of_color(DVec3::splat(0.5));
+    let gray = Material::new("gray", gray.expect("a diffuse material"));
+    scene.materials.push(gray);
+    Probe::new(&gpu(), &scene, placement, &effects).unwrap_or_else(|e| panic!("{e}"))
 }
 
 fn empty() -> Placement {
