@@ -71,7 +71,7 @@ pub(super) struct PriceArgs {
     #[arg(long, value_name = "TIME", value_parser = values::time, default_value = "5s",
           help_heading = "How long")]
     pub(super) pilot: Duration,
-    /// Measure which effects the time goes to, as `effects --measure` does: it takes as long again.
+    /// Measure which effects the time goes to, as `effects --measure` does: it takes several times as long.
     #[arg(long, help_heading = "Output")]
     pub(super) by_effect: bool,
     /// Print JSON.
