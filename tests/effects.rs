@@ -8,6 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex};
 
 use crate::common::{scene_file, scene_files};
+use crate::thorough::thorough;
 use glam::{DVec2, DVec3};
 use gpu_trace::effects::{Effect, Effects, table};
 use gpu_trace::image::Picture;
@@ -21,7 +22,7 @@ use gpu_trace::scene::{
     Texture, TextureImage,
 };
 use gpu_trace::settings::{GeometryChoice, Integrator, LightSampling, Offset, Settings, View};
-use gpu_trace::shader::{Kernel, Stage, declared_names, link};
+use gpu_trace::shader::{Stage, declared_names, link};
 use gpu_trace::verify::Random;
 use rayon::prelude::*;
 
@@ -114,6 +115,19 @@ fn largest() -> BTreeSet<Set> {
         .iter()
         .map(|start| filled(start.clone(), every().rev()));
     one_way.chain(other_way).collect()
+}
+
+/// The largest sets, and these without one of their effects: the short form leaves out each effect of the first set
+/// that has it, the long form of all.
+fn all_but_one() -> BTreeSet<Set> {
+    let largest = largest();
+    let mut sets = largest.clone();
+    for effect in every() {
+        let with = largest.iter().filter(|all| all.contains(&effect));
+        let most = if thorough() { usize::MAX } else { 1 };
+        sets.extend(with.take(most).filter_map(|all| without(all, effect)));
+    }
+    sets
 }
 
 /// The first case of a material that has this form.
@@ -319,8 +333,7 @@ struct Linked {
     fault: Option<String>,
 }
 
-/// Links both stages for a set, once for all tests. Its scene asks for it, or, where no scene does, for nearly
-/// it.
+/// Links a set, once for all tests. Its scene asks for it, or, where no scene does, for nearly it.
 fn linked(set: &Set) -> Arc<Linked> {
     static ALL: Mutex<BTreeMap<Set, Arc<Linked>>> = Mutex::new(BTreeMap::new());
     let known = ALL.lock().expect("no test panics here").get(set).cloned();
@@ -340,7 +353,7 @@ fn link_set(set: &Set) -> Linked {
         .used()
         .collect();
     let effects = Effects::of(&set.iter().copied().collect::<Vec<_>>());
-    let (names, fault) = judged(&scene, &placement, &effects, true);
+    let (names, fault) = judged(&scene, &placement, &effects);
     Linked {
         asked_for: derived == *set,
         names,
@@ -352,13 +365,9 @@ fn judged(
     scene: &Scene,
     placement: &Placement,
     effects: &Effects,
-    probe: bool,
 ) -> (BTreeSet<String>, Option<String>) {
     let set: Vec<&str> = effects.names().collect();
     let fault = |what: String| Some(format!("{set:?}: {what}"));
-    if probe && let Err(e) = link(Stage::Probe, scene, placement, effects) {
-        return (BTreeSet::new(), fault(format!("the probe: {e}")));
-    }
     match link(Stage::Path, scene, placement, effects) {
         Err(e) => (BTreeSet::new(), fault(e.to_string())),
         Ok(kernel) => {
@@ -367,6 +376,21 @@ fn judged(
             (names, wrong)
         }
     }
+}
+
+/// Links the probe of each set.
+fn check_probes(sets: &BTreeSet<Set>) {
+    let faults: Vec<String> = sets
+        .par_iter()
+        .filter_map(|set| {
+            let (scene, settings) = asking_for(set);
+            let placement = Placement::new(&scene, settings.width, settings.height);
+            let effects = Effects::of(&set.iter().copied().collect::<Vec<_>>());
+            let fault = link(Stage::Probe, &scene, &placement, &effects).err();
+            fault.map(|e| format!("{set:?}: {e}"))
+        })
+        .collect();
+    assert!(faults.is_empty(), "{}", faults.join("\n"));
 }
 
 /// Whether a name belongs to what all materials that transmit bring together.
@@ -493,6 +517,13 @@ fn the_table_can_be_fulfilled() {
 }
 
 #[test]
+fn probes_link() {
+    let mut sets = singles();
+    sets.extend(largest());
+    check_probes(&sets);
+}
+
+#[test]
 fn each_effect_alone() {
     for (set, linked) in check(&singles()) {
         let (scene, settings) = asking_for(&set);
@@ -519,18 +550,14 @@ fn all_pairs() {
 
 #[test]
 fn all_and_all_but_one() {
-    let mut sets = largest();
-    for all in &sets.clone() {
-        sets.extend(all.iter().filter_map(|effect| without(all, *effect)));
-    }
-    check(&sets);
+    check(&all_but_one());
 }
 
 #[test]
 fn a_sample_of_the_rest() {
     let mut random = Random::new("sets of effects");
     let mut sets = BTreeSet::new();
-    while sets.len() < SAMPLED[usize::from(crate::thorough::thorough())] {
+    while sets.len() < SAMPLED[usize::from(thorough())] {
         // From sparse to dense, in any order.
         let share = random.range(0.1, 0.9);
         let mut order: Vec<(f64, Effect)> = every().map(|e| (random.unit(), e)).collect();
@@ -568,7 +595,7 @@ fn every_set_in_the_scenes() {
             if completed(set.iter().copied()) != Some(set) {
                 return Some(format!("{}: not as the table says", path.display()));
             }
-            let (_, fault) = judged(&scene, &placement, &effects, false);
+            let (_, fault) = judged(&scene, &placement, &effects);
             fault.map(|fault| format!("{}: {fault}", path.display()))
         })
         .collect();
@@ -600,10 +627,7 @@ fn unmarked(all: &[(Set, Arc<Linked>)]) -> BTreeMap<&str, Set> {
 #[test]
 fn what_comes_with_an_effect_is_its_own() {
     let mut sets = singles();
-    for all in &largest() {
-        sets.insert(all.clone());
-        sets.extend(all.iter().filter_map(|effect| without(all, *effect)));
-    }
+    sets.extend(all_but_one());
     let all = check(&sets);
     let declared = unmarked(&all);
     assert!(declared.is_empty(), "{declared:#?}");
@@ -613,16 +637,10 @@ fn what_comes_with_an_effect_is_its_own() {
 fn companion_traces_are_found() {
     // A kernel with everything against a table with less, and the other way round.
     for set in largest() {
-        let kernel = |set: &Set| -> Kernel {
-            let (scene, settings) = asking_for(set);
-            let placement = Placement::new(&scene, settings.width, settings.height);
-            let effects = Effects::of(&set.iter().copied().collect::<Vec<_>>());
-            link(Stage::Path, &scene, &placement, &effects).unwrap_or_else(|e| panic!("{e}"))
-        };
-        let names = declared_names(&kernel(&set).module);
+        let names = &linked(&set).names;
         for effect in &set {
             let rest: Vec<Effect> = set.iter().copied().filter(|e| e != effect).collect();
-            let found = wrong_names(&names, &Effects::of(&rest));
+            let found = wrong_names(names, &Effects::of(&rest));
             let marked = !effect.row().marks.is_empty();
             assert_eq!(found.is_some(), marked, "{effect:?}: {found:?}");
             let alone = Effects::of(&[*effect]);

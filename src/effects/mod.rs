@@ -162,9 +162,17 @@ impl Row {
     /// type whose member it is, a module that it is in, or a few of these with `::`.
     #[must_use]
     pub fn is_marked(&self, name: &str) -> bool {
-        let name = format!("::{name}::");
-        let mut marks = self.marks.iter();
-        marks.any(|mark| name.contains(&format!("::{mark}::")))
+        // Names are many and marks are some: nothing is allocated here.
+        let is_part = |mark: &str, at: usize| {
+            let (before, after) = (&name[..at], &name[at + mark.len()..]);
+            (before.is_empty() || before.ends_with("::"))
+                && (after.is_empty() || after.starts_with("::"))
+        };
+        let found = |mark: &String| {
+            let mut places = name.match_indices(mark.as_str());
+            places.any(|(at, _)| is_part(mark, at))
+        };
+        self.marks.iter().any(found)
     }
 }
 

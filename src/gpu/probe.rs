@@ -4,13 +4,16 @@
 //! listed. An invocation reads a few rows of four 32-bit words and writes a few; here a row is
 //! `[f32; 4]` or `[u32; 4]`, and an invocation's rows are an array or a `repr(C)` struct of these.
 
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, PoisonError};
+
 use bytemuck::{Pod, Zeroable};
 
 use crate::effects::Effects;
 use crate::error::{Error, Result};
 use crate::gpu::data::SceneBytes;
 use crate::gpu::device::Gpu;
-use crate::gpu::engine::{Engine, Program, Recording};
+use crate::gpu::engine::{Engine, Pass, Program, Recording};
 use crate::gpu::layout::CameraRecord;
 use crate::placement::Placement;
 use crate::scene::Scene;
@@ -44,6 +47,8 @@ pub struct Probe {
     program: Program,
     camera: CameraRecord,
     data: SceneBytes,
+    /// Functions that were called, by name: a driver takes seconds to compile a large one.
+    compiled: Mutex<BTreeMap<String, Arc<Pass>>>,
 }
 
 impl Probe {
@@ -62,6 +67,7 @@ impl Probe {
             data,
             program,
             camera: CameraRecord::new(&placement.camera),
+            compiled: Mutex::default(),
         })
     }
 
@@ -89,14 +95,7 @@ impl Probe {
             0,
             "outputs of {function} are not whole rows"
         );
-        let entry = format!("probe_{function}");
-        let mut entries = self.kernel().module.entry_points.iter();
-        if !entries.any(|e| e.name == entry) {
-            return Err(Error::Shader(format!(
-                "the kernel has no function {function}"
-            )));
-        }
-        let pass = self.program.pass(&self.gpu, &entry, &[])?;
+        let pass = self.compiled(function)?;
         let mut engine = Engine::new(self.gpu.clone());
         let mut outputs = Vec::with_capacity(inputs.len());
         let mut data = Recording::default();
@@ -122,5 +121,23 @@ impl Probe {
             outputs.extend(records.map(bytemuck::pod_read_unaligned::<O>));
         }
         Ok(outputs)
+    }
+
+    /// The function, compiled once.
+    fn compiled(&self, function: &str) -> Result<Arc<Pass>> {
+        let mut compiled = self.compiled.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(pass) = compiled.get(function) {
+            return Ok(pass.clone());
+        }
+        let entry = format!("probe_{function}");
+        let mut entries = self.kernel().module.entry_points.iter();
+        if !entries.any(|e| e.name == entry) {
+            return Err(Error::Shader(format!(
+                "the kernel has no function {function}"
+            )));
+        }
+        let pass = Arc::new(self.program.pass(&self.gpu, &entry, &[])?);
+        compiled.insert(function.to_owned(), pass.clone());
+        Ok(pass)
     }
 }

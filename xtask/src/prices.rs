@@ -134,7 +134,7 @@ fn table(list: &Value, rows: &[Row]) -> String {
 }
 
 /// Sizes of the picture.
-const LEFT: f64 = 150.0;
+const LEFT: f64 = 180.0;
 const WIDTH: f64 = 720.0;
 const TOP: f64 = 74.0;
 const LINE: f64 = 18.0;

@@ -50,15 +50,15 @@ pub(in crate::materials) fn cases() -> Vec<CarPaint> {
             ..paint
         };
     vec![
-        // Flakes that need the search of one cell, of two and of three along each axis.
-        flaked(silver_of([0.4, 0.2, 0.05]), [0.4, 20.0, 0.0, 0.0], [0.2; 3]),
+        // Flakes that need the search of at most two cells along each axis, of one and of three.
         flaked(red.clone(), [0.6, 8.0, 0.3, 0.5], [0.2, 0.15, 0.1]),
-        flaked(coated(&red, 1.5), [1.0, 3.0, 0.15, 1.0], [0.15, 0.15, 0.2]),
+        flaked(silver_of([0.4, 0.2, 0.05]), [0.4, 20.0, 0.0, 0.0], [0.2; 3]),
         flaked(
             coated(&silver_of([0.3, 0.2, 0.1]), 2.0),
             [0.5, 50.0, 0.2, 0.25],
             [0.1; 3],
         ),
+        flaked(coated(&red, 1.5), [1.0, 3.0, 0.15, 1.0], [0.15, 0.15, 0.2]),
         // One that reflects nothing by itself, a usual coat, one of diamond over paint without lobes.
         coated(&red, 1.0),
         coated(&silver, 1.5),
