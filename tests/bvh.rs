@@ -337,7 +337,7 @@ fn a_lamp_is_seen_where_it_is_the_first_hit() {
 #[test]
 fn every_scene_by_the_tree_is_that_of_the_list() {
     let (mut noticed, mut all) = (0, 0);
-    for path in scene_files() {
+    for (i, path) in scene_files().into_iter().enumerate() {
         let scene = scene_file(&path);
         let film = |geometry, seed| {
             let settings = Settings {
@@ -354,8 +354,10 @@ fn every_scene_by_the_tree_is_that_of_the_list() {
         eprintln!("{}: {off}, the same bits: {same}", path.display());
         assert!(off < 0.02, "{}: {off} of the values differ", path.display());
         // Companion: other samples, but for scenes of one radiance everywhere.
-        noticed += usize::from(share_off(&film(GeometryChoice::Bvh, 1), &list) > 0.02);
-        all += 1;
+        if i % 4 == 0 {
+            noticed += usize::from(share_off(&film(GeometryChoice::Bvh, 1), &list) > 0.02);
+            all += 1;
+        }
     }
     assert!(
         2 * noticed > all,

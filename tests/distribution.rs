@@ -98,8 +98,12 @@ fn lens(power: f64) -> Vec<Outcome> {
     vec![("lens".into(), chi_square(&counts, &equal).p)]
 }
 
-/// Samples of each case of each material at each angle.
-const DRAWN: usize = 300_000;
+/// Samples of each case of each material at each angle, in the short form and in the long one.
+const DRAWN: [usize; 2] = [100_000, 300_000];
+
+fn drawn() -> usize {
+    DRAWN[usize::from(thorough())]
+}
 
 /// The short form draws from so many cases of a form, the long one from all; uniform directions, which are the
 /// same for all, from one.
@@ -138,7 +142,7 @@ fn found() -> &'static [Found] {
             for subject in subjects.first_of_each_form(most) {
                 // Delta lobes are the same whatever the integrator.
                 if integrator == Integrator::Bsdf || subjects.is_uniform(subject) {
-                    let draws = Draw::all(&subjects, subject, DRAWN);
+                    let draws = Draw::all(&subjects, subject, drawn());
                     for draw in draws.unwrap_or_else(|e| panic!("{e}")) {
                         let kind = subjects.kinds()[subject].clone();
                         found.push(Found::of(&draw, kind, integrator));
@@ -201,9 +205,9 @@ fn mean_weights_are_the_light_that_is_scattered() {
         // Uniform directions meet a narrow lobe a few times or never: no estimate.
         let rare = |draw: &Found| match draw.kind.moment(0, 2) {
             _ if integrator != LECTURE => false,
-            bound if bound.is_finite() => bound > DRAWN as f64,
+            bound if bound.is_finite() => bound > drawn() as f64,
             // Without a bound: if the peak is so high that less than a thousand find it.
-            _ => draw.peak > 1.0e-3 * DRAWN as f64,
+            _ => draw.peak > 1.0e-3 * drawn() as f64,
         };
         let found = found().iter().filter(|draw| draw.integrator == integrator);
         let all = found.clone().count();
@@ -272,7 +276,7 @@ fn glass(factor: f64) -> Vec<Outcome> {
     let subjects = subjects.unwrap_or_else(|e| panic!("{e}"));
     let mut outcomes = Vec::new();
     for subject in 0..subjects.kinds().len() {
-        let draws = Draw::all(&subjects, subject, DRAWN).unwrap_or_else(|e| panic!("{e}"));
+        let draws = Draw::all(&subjects, subject, drawn()).unwrap_or_else(|e| panic!("{e}"));
         for draw in &draws {
             let through = Event::TRANSMITTED.bits();
             let samples = draw.samples();
