@@ -32,6 +32,7 @@
 pub mod backend;
 pub mod bvh;
 pub mod check;
+pub mod choice;
 pub mod claims;
 pub mod cli;
 pub mod compare;

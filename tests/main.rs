@@ -15,6 +15,7 @@ mod aov;
 mod bvh;
 mod car_paint;
 mod check;
+mod choice;
 mod claims;
 mod cli;
 mod cli_commands;

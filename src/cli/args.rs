@@ -7,10 +7,11 @@ use std::time::Duration;
 use clap::{Args, Parser};
 use glam::DVec3;
 
-use super::choices::{self, Wanted};
+use super::choices::{self, Estimator, Wanted};
 use super::fault::Fault;
 use super::values;
 use crate::backend::{BackendChoice, BackendKind};
+use crate::choice::{Choice, choose};
 use crate::error::{Error, Result};
 use crate::output::{Aov, ProgressMode};
 use crate::sampler::Sampler;
@@ -185,14 +186,14 @@ pub struct RenderArgs {
     #[arg(
         long,
         value_name = "NAME",
-        value_enum,
-        default_value = "path",
+        value_parser = choices::estimator(),
+        default_value = "auto",
         hide_possible_values = true,
         hide_default_value = true,
         help_heading = "Light transport",
-        help = "Estimator: path (BSDF and light sampling), bsdf, nee (light sampling alone), or lecture (uniform hemisphere, constant p) [default: path]"
+        help = "Estimator: path (BSDF and light sampling), bsdf, nee (light sampling alone), lecture (uniform hemisphere, constant p), or auto: path or bsdf, whichever pays on the scene [default: auto]"
     )]
-    pub integrator: Integrator,
+    pub integrator: Estimator,
     #[arg(
         long,
         value_name = "NAME",
@@ -387,9 +388,32 @@ impl RenderArgs {
     /// The settings for `scene`: the command line wins over the scene, the scene over the defaults.
     ///
     /// # Errors
-    /// [`Error::Usage`] for options without meaning beside the others. Whether the settings can be
-    /// rendered is for [`prepare`](crate::job::prepare) to say.
+    /// [`Error::Usage`] for options without meaning beside the others; where the estimator is left to the scene,
+    /// those of [`choose`]. Whether the settings can be rendered is for [`prepare`](crate::job::prepare) to say.
     pub fn settings(&self, scene: &Scene) -> Result<Settings> {
+        self.decide(scene).map(|(settings, _)| settings)
+    }
+
+    /// The same, and where the estimator is left to the scene, why it is the one that it is.
+    ///
+    /// # Errors
+    /// Those of [`settings`](Self::settings).
+    pub(super) fn decide(&self, scene: &Scene) -> Result<(Settings, Option<Choice>)> {
+        let settings = self.settings_but_integrator(scene)?;
+        // Who says how lights are sampled wants them to be sampled.
+        if self.integrator != Estimator::Auto || self.light_sampling.is_some() {
+            return Ok((settings, None));
+        }
+        let choice = choose(scene, &settings)?;
+        let settings = Settings {
+            integrator: choice.integrator,
+            ..settings
+        };
+        Ok((settings, Some(choice)))
+    }
+
+    /// The settings, with `path` where the estimator is left to the scene.
+    fn settings_but_integrator(&self, scene: &Scene) -> Result<Settings> {
         self.check_company()?;
         let mut settings = Settings::for_scene(scene);
         if let Some((width, height)) = self.size {
@@ -411,12 +435,13 @@ impl RenderArgs {
             settings.samples = range.clone();
         }
         let termination = self.termination.unwrap_or(DEFAULT_TERMINATION);
+        let integrator = self.integrator.integrator().unwrap_or(Integrator::Path);
         Ok(Settings {
             seed: self.seed,
             max_bounces: self.max_bounces.unwrap_or(settings.max_bounces),
-            integrator: self.integrator.with_termination(termination),
+            integrator: integrator.with_termination(termination),
             light_sampling: self.light_sampling.unwrap_or_default(),
-            roulette: !self.integrator.is_lecture() && self.roulette != Some(false),
+            roulette: !integrator.is_lecture() && self.roulette != Some(false),
             sampler: self.sampler,
             geometry: self.geometry,
             view: self.view,
@@ -432,16 +457,18 @@ impl RenderArgs {
 
     /// Refuses options that say nothing beside the others.
     fn check_company(&self) -> Result<()> {
-        let lecture = self.integrator.is_lecture();
+        let named = self.integrator.integrator();
+        let lecture = named.is_some_and(Integrator::is_lecture);
         if self.termination.is_some() && !lecture {
             return Err(Error::Usage(
                 "--termination is the lecture's: add --integrator lecture".into(),
             ));
         }
-        if self.light_sampling.is_some() && (lecture || self.integrator == Integrator::Bsdf) {
+        let blind = named.filter(|i| i.is_lecture() || *i == Integrator::Bsdf);
+        if let Some(blind) = blind.filter(|_| self.light_sampling.is_some()) {
             return Err(Error::Usage(format!(
                 "--light-sampling says how path and nee sample lights: --integrator {} does not",
-                self.integrator.name()
+                blind.name()
             )));
         }
         if self.roulette.is_some() && lecture {

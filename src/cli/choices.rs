@@ -47,6 +47,35 @@ impl Wanted {
     }
 }
 
+/// How light transport is to be estimated.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Estimator {
+    /// By what pays on the scene ([`crate::choice`]).
+    Auto,
+    /// By this.
+    Only(Integrator),
+}
+
+impl Estimator {
+    /// What was asked for by name.
+    #[must_use]
+    pub fn integrator(self) -> Option<Integrator> {
+        match self {
+            Self::Auto => None,
+            Self::Only(integrator) => Some(integrator),
+        }
+    }
+}
+
+/// `auto`, or the name of an estimator.
+pub(super) fn estimator() -> impl TypedValueParser<Value = Estimator> {
+    let names = Integrator::ALL.iter().map(|integrator| integrator.name());
+    PossibleValuesParser::new(std::iter::once("auto").chain(names)).map(|name| {
+        let named = Integrator::ALL.iter().find(|i| i.name() == name);
+        named.map_or(Estimator::Auto, |integrator| Estimator::Only(*integrator))
+    })
+}
+
 /// `auto`, or the name of what renders.
 pub(super) fn backend() -> impl TypedValueParser<Value = Wanted> {
     let kinds = BackendKind::ALL.iter().map(|kind| kind.name());

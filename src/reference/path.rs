@@ -55,6 +55,10 @@ pub struct PathResult {
     pub radiance: DVec3,
     /// Rays traced.
     pub rays: u32,
+    /// Those of them that look for a light.
+    pub shadow_rays: u32,
+    /// Vertices at which a direction to a light was drawn.
+    pub connections: u32,
     /// Scattering events.
     pub bounces: u32,
     /// Throughput with which the bounce limit cut the path; zero if it did not.
@@ -188,6 +192,8 @@ impl PathTracer<'_> {
                 .map_or(path.class, |e| next_class(path.class, e));
             path.receive(class, path.throughput * direct.radiance);
             path.found.rays += direct.rays;
+            path.found.shadow_rays += direct.rays;
+            path.found.connections += u32::from(direct.event.is_some());
             path.departure.pdf_per_weight = direct.pdf_per_weight;
         }
         let s = self.sample(kind, &surface, wo, u);

@@ -29,9 +29,10 @@ const LONG_FORMS: &str = "GPU_TRACE_TEST_ALL";
 /// studies, to which a GPU is one like another; and those of light transport, whose formulas are asked
 /// on every driver by the others, one by one (`functions`, `materials`, `check`) and in whole images
 /// (`agreement`, `hazards`). All other files of `tests/` run on every driver.
-const ONCE: [&str; 32] = [
+const ONCE: [&str; 33] = [
     "albedo_variance",
     "car_paint",
+    "choice",
     "claims",
     "cli",
     "cli_commands",

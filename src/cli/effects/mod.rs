@@ -7,7 +7,9 @@ use std::fmt::Write as _;
 use clap::Args;
 
 use super::args::RenderArgs;
+use super::format::significant;
 use super::print;
+use crate::choice::Choice;
 use crate::effects::Effects;
 use crate::error::{Error, Result};
 use crate::job::prepare;
@@ -62,7 +64,7 @@ pub(super) fn run(args: &EffectsArgs) -> Result<()> {
     }
     let render = &args.render;
     let loaded = render.load()?;
-    let settings = render.settings(&loaded.scene)?;
+    let (settings, choice) = render.decide(&loaded.scene)?;
     let job = prepare(&loaded.scene, &settings)?;
     let effects = job.effects();
     let kernel = link(Stage::Path, job.scene(), job.placement(), effects)?;
@@ -86,16 +88,63 @@ pub(super) fn run(args: &EffectsArgs) -> Result<()> {
             .collect();
         return print_json(&serde_json::json!({
             "scene": loaded.name, "geometry": effects.geometry(), "kernel_lines": lines,
+            "integrator": settings.integrator.name(), "choice": choice.as_ref().map(choice_json),
             "effects": rows,
         }));
     }
-    print(&table(&loaded.name, effects, lines))
+    let chosen = choice.as_ref().map(why_chosen).unwrap_or_default();
+    print(&(table(&loaded.name, effects, lines) + &chosen))
 }
 
 fn print_json(value: &serde_json::Value) -> Result<()> {
     let text = serde_json::to_string_pretty(value)
         .map_err(|e| Error::Usage(format!("cannot write JSON: {e}")))?;
     print(&(text + "\n"))
+}
+
+/// What `--integrator auto` has chosen, and by which figures.
+fn why_chosen(choice: &Choice) -> String {
+    let name = choice.integrator.name();
+    let mut text = format!("\n--integrator auto is {name} here");
+    if let Some(why) = choice.without_pilot {
+        let _ = writeln!(text, ": {why}");
+        return text;
+    }
+    text += ", by a pilot of the f64 reference that counts and times nothing\n";
+    let _ = writeln!(
+        text,
+        "  {:10}  {:>17}  {:>11}  {:>12}  {:>11}  {:>8}",
+        "", "relative variance", "rays a path", "and to lamps", "cost a path", "effort"
+    );
+    for trial in &choice.trials {
+        let _ = write!(
+            text,
+            "  {:10}  {:>17}  {:>11}  {:>12}  {:>11}  {:>8}",
+            trial.integrator.name(),
+            significant(trial.relative_variance),
+            significant(trial.rays),
+            significant(trial.connections),
+            significant(trial.cost),
+            significant(trial.effort()),
+        );
+        let doubt = trial.doubt.as_ref().map(|why| format!("  doubtful: {why}"));
+        let _ = writeln!(text, "{}", doubt.unwrap_or_default());
+    }
+    text
+}
+
+fn choice_json(choice: &Choice) -> serde_json::Value {
+    let trials = choice.trials.iter().map(|trial| {
+        serde_json::json!({
+            "integrator": trial.integrator.name(), "relative_variance": trial.relative_variance,
+            "rays": trial.rays, "connections": trial.connections, "cost": trial.cost,
+            "effort": trial.effort(), "doubt": trial.doubt,
+        })
+    });
+    serde_json::json!({
+        "integrator": choice.integrator.name(), "without_pilot": choice.without_pilot,
+        "trials": trials.collect::<Vec<_>>(),
+    })
 }
 
 fn table(scene: &str, effects: &Effects, lines: usize) -> String {

@@ -15,7 +15,7 @@ use clap::{Args, Id};
 use self::options::Passed;
 use self::scripts::{JOBS, Plan, SUBMIT, quote};
 use super::args::RenderArgs;
-use super::choices::Wanted;
+use super::choices::{Estimator, Wanted};
 use super::format::{duration, percent};
 use super::signals::Signals;
 use super::{print, values};
@@ -155,6 +155,10 @@ pub(super) fn run(args: &SlurmArgs) -> Result<()> {
     if gpu && render.backend == Wanted::Auto {
         // A node without a driver must not go on with the CPU reference in its place.
         begin.push("--backend=gpu".into());
+    }
+    if render.integrator == Estimator::Auto {
+        // Chosen once, not by every part.
+        begin.push(format!("--integrator={}", job.settings().integrator.name()));
     }
     if let Some(limit) = render.error {
         merge.push(format!("--error={limit}"));

@@ -8,7 +8,7 @@ use crate::cli::choices::Wanted;
 use crate::error::{Error, Result};
 use crate::output::ProgressMode;
 use crate::sampler::Sampler;
-use crate::settings::{GeometryChoice, Integrator, Offset, Rect};
+use crate::settings::{GeometryChoice, Offset, Rect};
 
 /// The options that were given, by who needs them. Scene, outputs, samples, error and statistics are not among them.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -131,7 +131,7 @@ impl Passed {
         give("seed", Some(seed.to_string()).filter(|_| *seed != 0));
         give(
             "integrator",
-            unless(Integrator::Path, integrator, |i| i.name()),
+            integrator.integrator().map(|i| i.name().into()),
         );
         give("light-sampling", light_sampling.map(|l| l.name().into()));
         give("sampler", unless(Sampler::Sobol, sampler, |s| s.name()));

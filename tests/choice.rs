@@ -1,0 +1,188 @@
+//! `--integrator auto`: what it chooses, by which figures, and that these are right.
+
+use crate::cli_support::{Folder, holds};
+use crate::common::{render_gpu, scene, scene_file};
+use gpu_trace::choice::{Choice, choose};
+use gpu_trace::film::Estimate;
+use gpu_trace::scene::Scene;
+use gpu_trace::settings::{Integrator, Rect, Settings};
+
+fn chosen(scene: &Scene) -> Choice {
+    choose(scene, &Settings::for_scene(scene)).unwrap_or_else(|e| panic!("{e}"))
+}
+
+fn built_in(name: &str) -> Scene {
+    scene_file(std::path::Path::new(&format!("scenes/{name}.toml")))
+}
+
+#[test]
+fn what_pays_is_chosen() {
+    // Few lamps in rooms; a sky that is nearly all of the light.
+    for (name, integrator) in [
+        ("lecture", Integrator::Path),
+        ("disney", Integrator::Path),
+        ("field", Integrator::Bsdf),
+    ] {
+        let choice = chosen(&built_in(name));
+        assert_eq!(choice.integrator, integrator, "{name}: {choice:?}");
+        let [path, bsdf] = &choice.trials[..] else {
+            panic!("{name}: {choice:?}");
+        };
+        assert!(path.cost > bsdf.cost && path.relative_variance < bsdf.relative_variance);
+        let pays = path.effort() < bsdf.effort();
+        assert_eq!(pays, integrator == Integrator::Path, "{name}: {choice:?}");
+    }
+    // Nothing to choose.
+    let furnace = chosen(&built_in("tests/furnace"));
+    assert!(furnace.trials.is_empty() && furnace.without_pilot.is_some());
+    assert_eq!(furnace.integrator, Integrator::Path);
+}
+
+#[test]
+fn a_choice_is_a_function_of_the_scene_and_the_size() {
+    let scene = built_in("field");
+    let settings = Settings::for_scene(&scene);
+    let other = Settings {
+        seed: 7,
+        crop: Rect {
+            x: 3,
+            y: 5,
+            width: 16,
+            height: 8,
+        },
+        samples: 1024..2048,
+        classes: true,
+        ..settings.clone()
+    };
+    let found = |settings| choose(&scene, settings).expect("a choice");
+    assert_eq!(found(&settings), found(&other));
+    // Companion: figures of another size are other ones.
+    let wider = Settings {
+        width: 2 * settings.width,
+        ..settings.clone()
+    };
+    assert_ne!(found(&settings).trials, found(&wider).trials);
+}
+
+#[test]
+fn figures_are_those_of_renders() {
+    for name in ["lecture", "glass"] {
+        let scene = built_in(name);
+        let choice = chosen(&scene);
+        for trial in &choice.trials {
+            let settings = Settings {
+                width: 128,
+                height: 128,
+                crop: Rect {
+                    x: 0,
+                    y: 0,
+                    width: 128,
+                    height: 128,
+                },
+                samples: 0..64,
+                seed: 1,
+                integrator: trial.integrator,
+                ..Settings::for_scene(&scene)
+            };
+            let film = render_gpu(&scene, &settings);
+            let error = Estimate::of(&film).error.expect("an error");
+            let variance = error * error * 64.0;
+            let rays = film.tally().rays as f64 / film.paths() as f64;
+            // Of 1024 pixels, and of 256 paths. A connection whose BSDF is 0 has no ray.
+            let off = |a: f64, b: f64| (a / b - 1.0).abs();
+            eprintln!("{name}: {variance}, {rays} rays, {trial:?}");
+            assert!(off(trial.relative_variance, variance) < 0.4);
+            assert!(off(trial.rays + trial.connections, rays) < 0.15);
+            // Companion: these bounds tell the two apart.
+            let others = choice.trials.iter().filter(|t| *t != trial);
+            for other in others {
+                assert!(off(other.relative_variance, variance) > 0.4);
+                assert!(off(other.rays + other.connections, rays) > 0.15);
+            }
+        }
+    }
+}
+
+/// A ball under a sky, and a lamp so small that no path of a pilot finds it.
+fn far_lamp(radiance: f64) -> Scene {
+    scene(&format!(
+        "[camera]
+        position = [0.0, 0.0, 6.0]
+        look_at = [0.0, 0.0, 0.0]
+        fov = 25.0
+        [image]
+        width = 32
+        height = 32
+        [environment]
+        radiance = [1.0, 1.0, 1.0]
+        [material.gray]
+        type = \"diffuse\"
+        albedo = [0.5, 0.5, 0.5]
+        [material.lamp]
+        type = \"diffuse\"
+        albedo = [0.0, 0.0, 0.0]
+        emission = [{radiance:?}, {radiance:?}, {radiance:?}]
+        [[sphere]]
+        center = [0.0, 0.0, 0.0]
+        radius = 1.0
+        material = \"gray\"
+        [[sphere]]
+        center = [0.0, 5.0, 5.0]
+        radius = 1e-4
+        material = \"lamp\"
+        "
+    ))
+}
+
+#[test]
+fn a_pilot_that_misses_light_is_not_believed() {
+    // A part of the light: without it BSDF sampling has hardly any variance, and would be chosen.
+    let choice = chosen(&far_lamp(5.0e8));
+    let bsdf = &choice.trials[1];
+    assert!(bsdf.effort() < choice.trials[0].effort(), "{choice:?}");
+    let doubt = bsdf.doubt.as_deref().unwrap_or_default();
+    assert!(doubt.contains("missed light"), "{choice:?}");
+    assert_eq!(choice.integrator, Integrator::Path);
+    // Companion: where the lamp is nothing beside the sky, it is not worth the connections.
+    let choice = chosen(&far_lamp(1.0));
+    assert_eq!(choice.trials[1].doubt, None, "{choice:?}");
+    assert_eq!(choice.integrator, Integrator::Bsdf);
+}
+
+#[test]
+fn a_pilot_has_a_limit() {
+    let mut many = built_in("lecture");
+    let ball = many.spheres[0].clone();
+    for i in 0..7000 {
+        let mut ball = ball.clone();
+        ball.center.x += 1.0e4 + 3.0 * f64::from(i) * ball.radius;
+        many.spheres.push(ball);
+    }
+    let choice = chosen(&many);
+    assert_eq!(choice.integrator, Integrator::Path);
+    let why = choice.without_pilot.unwrap_or_default();
+    assert!(why.contains("more spheres"), "{choice:?}");
+}
+
+#[test]
+fn the_command_line_says_what_is_chosen() {
+    let folder = Folder::new();
+    let said = folder.ok("effects field");
+    holds(&said, &["--integrator auto is bsdf here", "effort"]);
+    let json: serde_json::Value =
+        serde_json::from_str(&folder.ok("effects field --json")).expect("JSON");
+    assert_eq!(json["integrator"], "bsdf");
+    assert_eq!(json["choice"]["trials"][1]["integrator"], "bsdf");
+    let of = |options: &str| {
+        let text = folder.ok(&format!("effects field --json {options}"));
+        let json: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+        assert!(json["choice"].is_null(), "{options}: {json}");
+        json["integrator"].as_str().map(str::to_owned)
+    };
+    // Who says which gets that; and who says how lights are sampled wants them to be.
+    assert_eq!(of("--integrator path").as_deref(), Some("path"));
+    assert_eq!(of("--light-sampling cone").as_deref(), Some("path"));
+    folder.ok("field --size 32x18 --spp 4 --stats s.json -o f.png");
+    let stats: serde_json::Value = serde_json::from_slice(&folder.read("s.json")).expect("JSON");
+    assert_eq!(stats["integrator"], "bsdf");
+}
