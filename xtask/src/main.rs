@@ -3,6 +3,7 @@
 mod bench;
 mod drivers;
 mod forecasts;
+mod gallery;
 mod lints;
 mod numerics;
 mod prices;
@@ -24,6 +25,7 @@ Usage: cargo xtask TASK
   numerics run `gpu-trace check` on every driver that is there, into the table of docs/numerics.md
            (--help for its options)
   prices   measure what every effect costs on this device, into docs/effects.md
+  gallery  render the pictures of docs/gallery.md and write it anew
   slurm    start a Slurm on this machine, which has to be installed, and run the tests of
            `submit slurm` on it
   soak     render for 30 minutes, or as many as are named, and fail if memory grows
@@ -37,6 +39,7 @@ fn main() -> ExitCode {
         Some("test") => test::all(&rest),
         Some("numerics") => numerics::all(&rest),
         Some("prices") => prices::all(&rest),
+        Some("gallery") => gallery::all(&rest),
         Some("bench") => bench::all(&rest),
         #[cfg(unix)]
         Some("slurm") => slurm::all(&rest),
