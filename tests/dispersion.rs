@@ -1,19 +1,17 @@
-//! Indices by the wavelength: the functions against their twins and published values, constant indices against those
-//! of no dispersion, and colours in their order.
+//! Indices by the wavelength: published values, constant indices against those of no dispersion, and colours in their
+//! order. The functions against their twins are case 43 of `check`.
 
 use glam::{DVec2, DVec3};
 use gpu_trace::film::Film;
 use gpu_trace::materials::dielectric::{Glass, Index};
 use gpu_trace::materials::{Bsdf as _, MaterialKind};
-use gpu_trace::reference::core::spectrum::{INTEGRALS, sample_wavelength, srgb};
+use gpu_trace::reference::core::spectrum::{INTEGRALS, srgb};
 use gpu_trace::scene::Scene;
 use gpu_trace::settings::{Integrator, Settings};
 use gpu_trace::statistics::normal_limit;
-use gpu_trace::verify::{Agreement, Random, Row, ULP, settings, vector};
+use gpu_trace::verify::settings;
 
-use crate::common::{probe_of, render_gpu, scene};
-
-const CASES: usize = 50_000;
+use crate::common::{render_gpu, scene};
 
 /// Balls of these materials in an environment of 1.
 fn balls(materials: &[&str]) -> Scene {
@@ -29,82 +27,6 @@ fn balls(materials: &[&str]) -> Scene {
         );
     }
     scene(&text)
-}
-
-const GLASSES: [&str; 6] = [
-    "preset = \"BK7\"",
-    "preset = \"SF10\"",
-    "preset = \"diamond\"",
-    "preset = \"water\"",
-    "cauchy = [1.5, 0.005]",
-    "sellmeier = { b = [1.0, 0.2, 0.0], c = [0.01, -0.02, 0.3] }",
-];
-
-#[test]
-fn wavelengths_and_weights_are_those_of_the_twin() {
-    let mut random = Random::new("wavelengths");
-    let inputs: Vec<Row> = (0..CASES).map(|_| random.unit4()).collect();
-    let probe = probe_of(&balls(&GLASSES), &["dielectric", "interior", "dispersion"]);
-    let outputs: Vec<Row> = probe
-        .call("sample_wavelength", &inputs)
-        .expect("the probe runs");
-    let run = |shift: f64| {
-        let mut agreement = Agreement::default();
-        for (input, output) in inputs.iter().zip(&outputs) {
-            let twin = sample_wavelength(f64::from(input[0]) + shift);
-            let place = || format!("{input:?}: {output:?} for {twin:?}");
-            // The logarithm is within 2^-21 or 3 ulp, 69 nm a unit; l itself is rounded.
-            let off = 69.4 * (2f64.powi(-21) + 8.0 * 4.3 * ULP) + 830.0 * ULP;
-            agreement.add((f64::from(output[3]) - twin.wavelength).abs(), off, place);
-            // The weight changes by that, and has the roundings of three products of sums.
-            let [before, after] =
-                [-off, off].map(|off| srgb(twin.wavelength + off) / srgb(twin.wavelength));
-            let slope = (before - 1.0).abs().max((after - 1.0).abs()) * twin.weight.abs();
-            let bound = slope.max_element() + 64.0 * ULP * 8.0;
-            let error = (vector(*output) - twin.weight).abs().max_element();
-            agreement.add(error, bound, place);
-        }
-        agreement
-    };
-    run(0.0).assert_holds(2 * CASES);
-    run(1.0e-3).assert_fails();
-    assert!(INTEGRALS.min_element() > 0.0);
-}
-
-#[test]
-fn indices_are_those_of_the_twin() {
-    let scene = balls(&GLASSES);
-    let mut random = Random::new("indices");
-    let inputs: Vec<[[u32; 4]; 2]> = (0..CASES)
-        .map(|i| {
-            let wavelength = random.range(360.0, 830.0) as f32;
-            [
-                [0, 0, 0, (i % GLASSES.len()) as u32],
-                [wavelength.to_bits(), 0, 0, 0],
-            ]
-        })
-        .collect();
-    let probe = probe_of(&scene, &["dielectric", "interior", "dispersion"]);
-    let outputs: Vec<Row> = probe.call("index_at", &inputs).expect("the probe runs");
-    let run = |factor: f64| {
-        let mut agreement = Agreement::default();
-        for ([place, wavelength], output) in inputs.iter().zip(&outputs) {
-            let kind = &scene.materials[place[3] as usize].kind;
-            let wavelength = f64::from(f32::from_bits(wavelength[0]));
-            let twin = match kind.dispersion() {
-                Some(index) => index.at(factor * wavelength),
-                None => kind.ior() * factor.powf(0.01),
-            };
-            // l^2 has 3 roundings and the difference from c, a half of it at least, 8; 8 more.
-            let bound = 16.0 * ULP * twin;
-            agreement.add((f64::from(output[0]) - twin).abs(), bound, || {
-                format!("{} at {wavelength}: {} for {twin}", kind.name(), output[0])
-            });
-        }
-        agreement
-    };
-    run(1.0).assert_holds(CASES);
-    run(1.01).assert_fails();
 }
 
 #[test]

@@ -6,6 +6,7 @@
 //! fail: a case that cannot fail shows nothing.
 
 mod context;
+mod dispersion;
 mod driver;
 mod exits;
 mod film;
@@ -18,6 +19,7 @@ mod placing;
 mod random;
 mod sampled;
 mod sampling;
+mod textures;
 mod tree;
 mod variance;
 
@@ -56,7 +58,7 @@ pub struct Case {
 /// All cases, by number.
 #[must_use]
 pub fn cases() -> Vec<Case> {
-    let groups: [&[Case]; 11] = [
+    let groups: [&[Case]; 13] = [
         intersection::CASES,
         placing::CASES,
         lights::CASES,
@@ -68,6 +70,8 @@ pub fn cases() -> Vec<Case> {
         random::CASES,
         tree::CASES,
         variance::CASES,
+        textures::CASES,
+        dispersion::CASES,
     ];
     let mut all = groups.concat();
     all.sort_by_key(|case| case.id);

@@ -149,7 +149,8 @@ fn page() -> Result<String, String> {
     } in &PICTURES
     {
         let said = root().join(format!("{FOLDER}/{name}.txt"));
-        let said = std::fs::read_to_string(&said).map_err(|e| format!("{}: {e}", said.display()))?;
+        let said =
+            std::fs::read_to_string(&said).map_err(|e| format!("{}: {e}", said.display()))?;
         let said = said.replace(&format!("{FOLDER}/"), "");
         let scene = command.split(' ').next().unwrap_or(command);
         let asked: Value = serde_json::from_str(&ask(&format!("effects {scene} --json"))?)
