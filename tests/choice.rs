@@ -152,9 +152,9 @@ fn a_pilot_that_misses_light_is_not_believed() {
 #[test]
 fn a_pilot_has_a_limit() {
     let mut many = built_in("lecture");
-    let ball = many.spheres[0].clone();
+    let ball = many.spheres[0];
     for i in 0..7000 {
-        let mut ball = ball.clone();
+        let mut ball = ball;
         ball.center.x += 1.0e4 + 3.0 * f64::from(i) * ball.radius;
         many.spheres.push(ball);
     }
