@@ -221,6 +221,7 @@ fn asking_for(set: &Set) -> (Scene, Settings) {
     let mut sphere = |material: usize, x: f64, y: f64, z: f64, radius: f64| {
         spheres.push(Sphere {
             center: DVec3::new(x, y, z),
+            motion: DVec3::ZERO,
             radius,
             material,
             priority: None,

@@ -140,6 +140,7 @@ fn random_scene(random: &mut Random, count: usize, glass: f64) -> Scene {
         let known = scene.spheres.get(known as usize).copied();
         let fresh = Sphere {
             center: far + place + spread * random.direction() * random.unit(),
+            motion: DVec3::ZERO,
             radius: random.magnitude(-decades, 0.0),
             material: 0,
             priority: None,
