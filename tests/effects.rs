@@ -257,6 +257,11 @@ fn asking_for(set: &Set) -> (Scene, Settings) {
         // Around the camera, and too far away for a pole frame.
         sphere(0, 0.0, 0.0, 0.0, 100.0);
     }
+    if has(Effect::Motion) {
+        for sphere in &mut spheres {
+            sphere.motion = DVec3::new(0.1, 0.0, 0.0);
+        }
+    }
     let scene = Scene {
         camera: Camera {
             position: DVec3::new(0.0, 0.0, 6.0),

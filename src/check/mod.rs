@@ -14,6 +14,7 @@ mod integrator;
 mod intersection;
 mod lights;
 mod materials;
+mod motion;
 mod placing;
 mod random;
 mod sampled;
@@ -56,7 +57,7 @@ pub struct Case {
 /// All cases, by number.
 #[must_use]
 pub fn cases() -> Vec<Case> {
-    let groups: [&[Case]; 11] = [
+    let groups: [&[Case]; 12] = [
         intersection::CASES,
         placing::CASES,
         lights::CASES,
@@ -67,6 +68,7 @@ pub fn cases() -> Vec<Case> {
         film::CASES,
         random::CASES,
         tree::CASES,
+        motion::CASES,
         variance::CASES,
     ];
     let mut all = groups.concat();
