@@ -341,7 +341,10 @@ fn a_light_is_written_with_the_members_that_the_kernel_has() {
             ("motion", 9.0),
         ] {
             let Some((_, offset)) = members.iter().find(|(member, _)| member == name) else {
-                assert!(!without.is_empty() && value >= 5.0, "{name} without {without}");
+                assert!(
+                    !without.is_empty() && value >= 5.0,
+                    "{name} without {without}"
+                );
                 continue;
             };
             let found: [u8; 4] = bytes[*offset as usize..][..4].try_into().expect("a number");

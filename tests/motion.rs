@@ -112,7 +112,9 @@ fn check_frames(scene: &Scene, settings: &Settings) {
     let [wrong, _] = apart(&blocks(&render_gpu(&slower, &whole)), &frames);
     let limit = normal_limit(found.len());
     let name = settings.integrator.name();
-    eprintln!("{name}: {worst:.2} of {limit:.2}; 5 % would be {power:.1}; half as far is {wrong:.1}");
+    eprintln!(
+        "{name}: {worst:.2} of {limit:.2}; 5 % would be {power:.1}; half as far is {wrong:.1}"
+    );
     assert!(worst < limit, "{name}: {worst} deviations");
     assert!(wrong > limit, "{name}: the companion is off by {wrong}");
     assert!(power > limit, "{name}: the power is {power}");
@@ -140,7 +142,10 @@ fn a_moving_lamp_is_the_mean_of_its_frames() {
     check_frames(&scene, &base);
     for (integrator, light_sampling) in [
         (Integrator::Nee, LightSampling::Cone),
-        (Integrator::Lecture { termination: 0.2 }, LightSampling::Projected),
+        (
+            Integrator::Lecture { termination: 0.2 },
+            LightSampling::Projected,
+        ),
     ] {
         if matches!(integrator, Integrator::Nee) && !crate::thorough::thorough() {
             // The short form can show what the others have in common.
@@ -260,7 +265,10 @@ fn what_does_not_move_has_no_motion_in_its_kernel() {
         }
         // A still image at another time is one of a ball that is elsewhere.
         let displaced = scene(&BALL.replace("[0.25, 0, 0]", "[1.25, 1.0, -0.5]"));
-        let later = scene(&ball("shutter = [2, 2]\n", "velocity = [0.5, 0.5, -0.25]\n"));
+        let later = scene(&ball(
+            "shutter = [2, 2]\n",
+            "velocity = [0.5, 0.5, -0.25]\n",
+        ));
         assert_eq!(displaced, later);
         assert!(kernel(&displaced) == kernel(&later) && kernel(&later) != wanted);
         // And what moves does so in its kernel.
@@ -273,14 +281,44 @@ fn what_does_not_move_has_no_motion_in_its_kernel() {
 #[test]
 fn ways_that_cannot_be_are_refused_with_their_lines() {
     for (shutter, velocity, place, parts) in [
-        ("shutter = [1, 0]\n", "", "4:11", ["closes before it opens", "[0.0, 1.0]"]),
+        (
+            "shutter = [1, 0]\n",
+            "",
+            "4:11",
+            ["closes before it opens", "[0.0, 1.0]"],
+        ),
         // Through the camera, and into it.
-        ("shutter = [0, 1]\n", "velocity = [0, 0, 9]\n", "24:12", ["over the camera", "2 │ position"]),
-        ("shutter = [0, 1]\n", "velocity = [0, 0, 3.5]\n", "24:12", ["over the camera", "outside of it"]),
+        (
+            "shutter = [0, 1]\n",
+            "velocity = [0, 0, 9]\n",
+            "24:12",
+            ["over the camera", "2 │ position"],
+        ),
+        (
+            "shutter = [0, 1]\n",
+            "velocity = [0, 0, 3.5]\n",
+            "24:12",
+            ["over the camera", "outside of it"],
+        ),
         // As far as nothing is known of it any more.
-        ("shutter = [0, 1]\n", "velocity = [2e4, 0, 0]\n", "24:12", ["2.00e4 times its radius", "at most 16384"]),
-        ("shutter = [0, 1e15]\n", "velocity = [1e15, 0, 0]\n", "24:12", ["beyond 1e20", "4 │ shutter"]),
-        ("shutter = [1e15, 1e15]\n", "velocity = [0, 1e15, 0]\n", "24:12", ["beyond 1e20", "lower velocity"]),
+        (
+            "shutter = [0, 1]\n",
+            "velocity = [2e4, 0, 0]\n",
+            "24:12",
+            ["2.00e4 times its radius", "at most 16384"],
+        ),
+        (
+            "shutter = [0, 1e15]\n",
+            "velocity = [1e15, 0, 0]\n",
+            "24:12",
+            ["beyond 1e20", "4 │ shutter"],
+        ),
+        (
+            "shutter = [1e15, 1e15]\n",
+            "velocity = [0, 1e15, 0]\n",
+            "24:12",
+            ["beyond 1e20", "lower velocity"],
+        ),
     ] {
         let text = ball(shutter, velocity);
         let said = match load_str("bad.toml", &text) {
@@ -288,11 +326,17 @@ fn ways_that_cannot_be_are_refused_with_their_lines() {
             other => panic!("{shutter}{velocity}: {other:?}"),
         };
         assert!(said.contains(&format!("┌─ bad.toml:{place}\n")), "{said}");
-        assert!(parts.iter().all(|part| said.contains(part)), "{parts:?}: {said}");
+        assert!(
+            parts.iter().all(|part| said.contains(part)),
+            "{parts:?}: {said}"
+        );
     }
     // The program says so, and exits with 2.
     let folder = Folder::new();
-    folder.write("bad.toml", ball("shutter = [0, 1]\n", "velocity = [0, 0, 9]\n"));
+    folder.write(
+        "bad.toml",
+        ball("shutter = [0, 1]\n", "velocity = [0, 0, 9]\n"),
+    );
     for command in ["bad.toml -o out.png", "scene check bad.toml"] {
         let run = folder.run(command);
         assert_eq!(run.code, Some(2), "{run:?}");
@@ -302,22 +346,38 @@ fn ways_that_cannot_be_are_refused_with_their_lines() {
     let mut scene = scene(BALL);
     scene.spheres[1].motion = 2.0 * LONGEST_WAY * DVec3::X;
     let settings = Settings::for_scene(&scene);
-    assert!(matches!(prepare(&scene, &settings), Err(Error::Placement(_))));
+    assert!(matches!(
+        prepare(&scene, &settings),
+        Err(Error::Placement(_))
+    ));
     scene.spheres[1].motion = 0.5 * LONGEST_WAY * DVec3::Y;
     assert!(prepare(&scene, &settings).is_ok());
     // What is probably not meant is said.
     let loaded = load_str("warned", &ball("", "velocity = [1, 0, 0]\n")).expect("a scene");
-    assert!(loaded.warnings[0].contains("no `shutter`"), "{:?}", loaded.warnings);
-    let loaded = load_str("quiet", &ball("shutter = [0, 0]\n", "velocity = [1, 0, 0]\n"));
+    assert!(
+        loaded.warnings[0].contains("no `shutter`"),
+        "{:?}",
+        loaded.warnings
+    );
+    let loaded = load_str(
+        "quiet",
+        &ball("shutter = [0, 0]\n", "velocity = [1, 0, 0]\n"),
+    );
     assert_eq!(loaded.expect("a scene").warnings, [""; 0]);
 }
 
 #[test]
 fn the_program_says_what_moves() {
     let folder = Folder::new();
-    folder.write("ball.toml", ball("shutter = [0, 2]\n", "velocity = [0.5, 0, 0]\n"));
+    folder.write(
+        "ball.toml",
+        ball("shutter = [0, 2]\n", "velocity = [0.5, 0, 0]\n"),
+    );
     let said = folder.ok("scene check ball.toml");
-    holds(&said, &["motion       1 sphere, by up to 1.00 while the shutter is open"]);
+    holds(
+        &said,
+        &["motion       1 sphere, by up to 1.00 while the shutter is open"],
+    );
     let said = folder.ok("effects ball.toml");
     holds(&said, &["motion", "for sphere 2 (glass), which moves"]);
     folder.write("still.toml", BALL);
@@ -393,7 +453,9 @@ fn what_is_decided_holds_at_all_times() {
         let mut broken = false;
         for i in 0..=16 {
             let still = at(&scene, f64::from(i) / 16.0 - 0.5);
-            whole.holds_in(&still).unwrap_or_else(|e| panic!("{e}: {still:#?}"));
+            whole
+                .holds_in(&still)
+                .unwrap_or_else(|e| panic!("{e}: {still:#?}"));
             broken |= middle.holds_in(&still).is_err();
         }
         otherwise += u32::from(broken);

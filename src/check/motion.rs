@@ -47,9 +47,8 @@ fn moving(random: &mut Random, i: usize) -> Option<(Rows, DVec3)> {
     let distance = radius * random.range(1.5, 20.0);
     let (from, d) = ray(random, distance, 0.9 * radius * random.unit().sqrt());
     let [bent, _, frame_rows @ ..] = bounce_rows(from, false, d, radius, None);
-    let way = |random: &mut Random| {
-        rounded(radius * random.magnitude(-2.0, 3.0) * random.direction())
-    };
+    let way =
+        |random: &mut Random| rounded(radius * random.magnitude(-2.0, 3.0) * random.direction());
     let (own, other) = (way(random), way(random));
     let time = f64::from((random.unit() - 0.5) as f32);
     let anchor = rounded(random.range(0.0, 4.0) * random.direction());
@@ -77,9 +76,7 @@ fn moving(random: &mut Random, i: usize) -> Option<(Rows, DVec3)> {
 fn one_by_one(context: &Context, measure: &mut Measure) -> Result<()> {
     let mut random = Random::new("spheres that move");
     let count = context.size(20_000, 200_000);
-    let cases: Vec<(Rows, DVec3)> = (0..count)
-        .filter_map(|i| moving(&mut random, i))
-        .collect();
+    let cases: Vec<(Rows, DVec3)> = (0..count).filter_map(|i| moving(&mut random, i)).collect();
     let inputs: Vec<Rows> = cases.iter().map(|(rows, _)| *rows).collect();
     let probe = context.probe(&GLASS)?;
     let outputs: Vec<[Row; 3]> = probe.call("bounce", &inputs)?;

@@ -165,9 +165,7 @@ pub(super) fn rows() -> Vec<Row> {
             Effect::Motion,
             "motion",
             "spheres that move while the shutter is open: a time for each path",
-            |asked| {
-                asked.placed(|s| (s.motion != DVec3::ZERO).then_some(", which moves"))
-            },
+            |asked| asked.placed(|s| (s.motion != DVec3::ZERO).then_some(", which moves")),
         )
         .needs(forms_that(|_| true))
         .marks(["motion", "time", "anchors_apart", "apart", "TIME"]),

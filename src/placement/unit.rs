@@ -15,7 +15,10 @@ pub(super) fn length(
     let extent = all
         .iter()
         .map(|&i| match poles[i] {
-            Some(n) => (i, pole_point(centers[i], scene.spheres[i].radius, n).length()),
+            Some(n) => (
+                i,
+                pole_point(centers[i], scene.spheres[i].radius, n).length(),
+            ),
             None => (i, centers[i].length() + scene.spheres[i].radius),
         })
         .map(|(i, reach)| reach + 0.5 * scene.spheres[i].motion.length())

@@ -366,9 +366,9 @@ fn motion(scene: &Scene, camera: &CameraTable, spheres: &[SphereTable], report: 
     if let Some(velocity) = first.filter(|_| camera.shutter.is_none()) {
         let message = "`velocity` moves nothing: the camera has no `shutter`";
         let problem = Problem::new(velocity.span(), message, "");
-        report.warnings.push(problem.help(
-            "`shutter = [0.0, 1.0]` in `[camera]` is open from time 0 to time 1",
-        ));
+        report.warnings.push(
+            problem.help("`shutter = [0.0, 1.0]` in `[camera]` is open from time 0 to time 1"),
+        );
     }
 }
 

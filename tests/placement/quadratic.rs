@@ -153,7 +153,8 @@ fn neighbours(balls: &[Ball]) -> Vec<Vec<usize>> {
                 balls[j].center - balls[i].center,
                 balls[j].motion - balls[i].motion,
             );
-            if is_open && Distances::of(between, motion).least <= balls[j].radius + balls[i].radius {
+            if is_open && Distances::of(between, motion).least <= balls[j].radius + balls[i].radius
+            {
                 found[i].push(j);
                 found[j].push(i);
             }
@@ -166,9 +167,8 @@ fn containers(scene: &Scene, sides: &[Side], reachable: &[bool]) -> Vec<Option<u
     let mut containers = vec![None; scene.spheres.len()];
     let mut order: Vec<usize> = (0..scene.spheres.len()).filter(|i| reachable[*i]).collect();
     let x = |i: usize| scene.spheres[i].center.x;
-    let way = |i: usize, j: usize| {
-        0.5 * (scene.spheres[i].motion.x - scene.spheres[j].motion.x).abs()
-    };
+    let way =
+        |i: usize, j: usize| 0.5 * (scene.spheres[i].motion.x - scene.spheres[j].motion.x).abs();
     order.sort_by(|a, b| x(*a).total_cmp(&x(*b)));
     for &outer in order.iter().filter(|i| sides[**i] == Side::Tracked) {
         let reach = CLOSE * scene.spheres[outer].radius;
