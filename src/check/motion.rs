@@ -45,7 +45,8 @@ fn rounded(v: DVec3) -> DVec3 {
 fn moving(random: &mut Random, i: usize) -> Option<(Rows, DVec3)> {
     let radius = f64::from(random.magnitude(-3.0, 0.0) as f32);
     let distance = radius * random.range(1.5, 20.0);
-    let (from, d) = ray(random, distance, 0.9 * radius * random.unit().sqrt());
+    let impact = 0.9 * radius * random.unit().sqrt();
+    let (from, d) = ray(random, distance, impact);
     let [bent, _, frame_rows @ ..] = bounce_rows(from, false, d, radius, None);
     let way =
         |random: &mut Random| rounded(radius * random.magnitude(-2.0, 3.0) * random.direction());
