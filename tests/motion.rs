@@ -272,7 +272,10 @@ fn what_does_not_move_has_no_motion_in_its_kernel() {
             "velocity = [0.5, 0.5, -0.25]\n",
         ));
         assert_eq!(displaced, later);
-        assert!(kernel(&displaced) == kernel(&later) && kernel(&later) != wanted);
+        assert!(kernel(&displaced) == kernel(&later));
+        // Where spheres are is in the text of this one alone.
+        let says_where = geometry == GeometryChoice::Baked;
+        assert_eq!(kernel(&later) != wanted, says_where);
         // And what moves does so in its kernel.
         let moving = scene(&ball("shutter = [0, 1]\n", "velocity = [0.5, 0, 0]\n"));
         assert_ne!(content_hash(&moving), content_hash(&at(&moving, 0.0)));
@@ -307,7 +310,7 @@ fn ways_that_cannot_be_are_refused_with_their_lines() {
             "shutter = [0, 1]\n",
             "velocity = [2e4, 0, 0]\n",
             "24:12",
-            ["2.00e4 times its radius", "at most 16384"],
+            ["by 20000 times its radius", "at most 16384"],
         ),
         (
             "shutter = [0, 1e15]\n",
