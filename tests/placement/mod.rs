@@ -229,10 +229,14 @@ fn random_scenes(name: &str) -> impl Iterator<Item = (String, Scene)> {
     let sizes = std::iter::repeat_n(10, 150)
         .chain(std::iter::repeat_n(40, 100))
         .chain(std::iter::repeat_n(200, 30))
-        .chain([700, 700, 2000, 2000]);
-    sizes.enumerate().map(move |(i, count)| {
+        .chain([700, 700, 2000, 2000])
+        .map(|count| (count, false))
+        // Spheres that move.
+        .chain(std::iter::repeat_n((40, true), 100))
+        .chain([(700, true)]);
+    sizes.enumerate().map(move |(i, (count, moving))| {
         let glass = [0.1, 0.5, 0.9][i % 3];
-        let scene = random_scene(&mut random, count, glass, i % 4 == 3);
+        let scene = random_scene(&mut random, count, glass, moving);
         (format!("scene {i} of {count} spheres"), scene)
     })
 }
