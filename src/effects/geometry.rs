@@ -168,7 +168,7 @@ pub(super) fn rows() -> Vec<Row> {
             |asked| asked.placed(|s| (s.motion != DVec3::ZERO).then_some(", which moves")),
         )
         .needs(forms_that(|_| true))
-        .marks(["motion", "time", "anchors_apart", "apart", "TIME"]),
+        .marks(["motion", "time", "anchors_apart", "TIME"]),
     ]
 }
 
