@@ -10,6 +10,7 @@ use crate::error::{Error, Result};
 use crate::film::PILOT_SAMPLES;
 use crate::placement::media::MAX_LEVELS;
 use crate::placement::{Placement, Side};
+use crate::scene::motion::Fault;
 use crate::scene::{MAX_BOUNCES, MAX_SIDE, MAX_SPP, Scene};
 use crate::settings::{GeometryChoice, Integrator, Offset, Settings, TERMINATIONS, View};
 use crate::variance::{VarianceReport, variance_class};
@@ -35,6 +36,7 @@ pub fn prepare(scene: &Scene, settings: &Settings) -> Result<Job> {
     check_samples(settings)?;
     check_transport(settings)?;
     check_geometry(scene, settings)?;
+    check_motion(scene)?;
     let placement = Placement::with_offset(scene, settings.width, settings.height, settings.offset);
     check_levels(&placement)?;
     check_magnitudes(scene, &placement)?;
@@ -184,6 +186,16 @@ fn check_geometry(scene: &Scene, settings: &Settings) -> Result<()> {
     Ok(())
 }
 
+/// Refuses spheres that move as they cannot; a scene file is refused before, with their lines.
+fn check_motion(scene: &Scene) -> Result<()> {
+    let faults = (1..).zip(&scene.spheres);
+    let mut faults = faults.filter_map(|(i, sphere)| Some((i, Fault::of(scene, sphere)?)));
+    faults.next().map_or(Ok(()), |(i, fault)| {
+        let (what, help) = (fault.what(), fault.help());
+        Err(Error::Placement(format!("sphere {i} {what}: {help}")))
+    })
+}
+
 /// Refuses views of what is not in the kernel.
 fn check_view(settings: &Settings, effects: &Effects) -> Result<()> {
     if settings.view == Some(View::BvhCost) && !effects.has(Effect::Bvh) {
@@ -226,6 +238,9 @@ fn check_magnitudes(scene: &Scene, placement: &Placement) -> Result<()> {
         }
         if !sphere.anchor.as_vec3().is_finite() {
             return refuse(&format!("the center of sphere {}", sphere.source + 1));
+        }
+        if !sphere.motion.as_vec3().is_finite() {
+            return refuse(&format!("the way of sphere {}", sphere.source + 1));
         }
         let absorption = scene.materials[sphere.material].kind.absorption();
         if !(absorption / placement.scale).as_vec3().is_finite() {

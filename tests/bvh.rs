@@ -30,6 +30,7 @@ struct Answer {
 fn balls(crowd: &Crowd) -> Vec<Ball> {
     let ball = |&(center, radius): &(Vec3, f32)| Ball {
         center,
+        motion: Vec3::ZERO,
         radius,
         apart: false,
     };
@@ -117,6 +118,7 @@ fn every_sphere_is_in_every_box_around_it() {
             let smaller = Options {
                 scale: 1.0 - 1.0e-4,
                 slack: 0.0,
+                ..Options::default()
             };
             let smaller = Tree::with(&balls, 0, smaller);
             assert!(fault(&smaller, &balls).is_some(), "{}", crowd.name);

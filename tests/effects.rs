@@ -235,6 +235,7 @@ fn asking_for(set: &Set) -> (Scene, Settings) {
     let mut sphere = |material: usize, x: f64, y: f64, z: f64, radius: f64| {
         spheres.push(Sphere {
             center: DVec3::new(x, y, z),
+            motion: DVec3::ZERO,
             radius,
             material,
             priority: None,
@@ -269,6 +270,11 @@ fn asking_for(set: &Set) -> (Scene, Settings) {
     if has(Effect::Interior) && glass.is_none() && !has(Effect::Straddle) {
         // Around the camera, and too far away for a pole frame.
         sphere(0, 0.0, 0.0, 0.0, 100.0);
+    }
+    if has(Effect::Motion) {
+        for sphere in &mut spheres {
+            sphere.motion = DVec3::new(0.1, 0.0, 0.0);
+        }
     }
     let scene = Scene {
         camera: Camera {

@@ -206,6 +206,7 @@ fn placed(anchor: Row, radius: f64, pole: Option<DVec3>) -> PlacedSphere {
         source: 0,
         material: 0,
         anchor: vector(anchor),
+        motion: DVec3::ZERO,
         radius,
         pole,
         side: Side::Tracked,
@@ -262,6 +263,8 @@ fn vertex_at_agrees() {
             let t = f64::from(start[3]) + shift;
             let ray = Ray {
                 anchor: vector(start),
+                motion: DVec3::ZERO,
+                time: 0.0,
                 offset: vector(from),
                 direction: vector(d),
                 own: None,

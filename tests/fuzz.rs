@@ -266,6 +266,8 @@ const TOKENS: &[&str] = &[
     "\"left\"",
     "aperture_radius",
     "focus_distance",
+    "shutter",
+    "velocity",
     "type",
     "\"diffuse\"",
     "\"mirror\"",
@@ -289,6 +291,8 @@ const TOKENS: &[&str] = &[
     "priority = 1\n",
     "aperture_radius = 0.1\n",
     "focus_distance = 1\n",
+    "shutter = [0, 1]\n",
+    "velocity = [1, 2, 3]\n",
 ];
 
 const OPTIONS: &[&str] = &[
@@ -735,6 +739,7 @@ fn assert_finite(placement: &Placement) {
     );
     for sphere in &placement.spheres {
         vector("anchor", sphere.anchor);
+        vector("motion", sphere.motion);
         number("radius", sphere.radius);
         vector("pole", sphere.pole.unwrap_or_default());
     }

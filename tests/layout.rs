@@ -76,8 +76,8 @@ fn check(name: &str, host: &Layout, kernel: &Kernel) {
 }
 
 /// Everything that fixed structs need.
-const FULL: [&str; 9] = [
-    "list", "pole", "interior", "lens", "diffuse", "emission", "lights", "table", "mis",
+const FULL: [&str; 10] = [
+    "list", "pole", "interior", "lens", "motion", "diffuse", "emission", "lights", "table", "mis",
 ];
 
 /// Structs that GLSL would lay out otherwise, and why. naga writes their members without offsets
@@ -136,6 +136,7 @@ fn glsl_has_the_same_layouts() {
         "pole",
         "interior",
         "lens",
+        "motion",
         "emission",
         "reflective",
         "dielectric",
@@ -213,23 +214,36 @@ fn light() -> Layout {
         sphere,
         pole,
         curvature,
+        motion,
+        unused,
+    })
+}
+
+fn sphere() -> Layout {
+    host!(SphereRecord {
+        center,
+        radius,
+        motion,
+        unused,
+    })
+}
+
+fn pole() -> Layout {
+    host!(PoleRecord {
+        point,
+        curvature,
+        normal,
+        unused,
+        motion,
+        unused1,
     })
 }
 
 #[test]
 fn fixed_structs_agree() {
     let kernel = kernel(Stage::Path, &FULL);
-    check("Sphere", &host!(SphereRecord { center, radius }), &kernel);
-    check(
-        "Pole",
-        &host!(PoleRecord {
-            point,
-            curvature,
-            normal,
-            unused
-        }),
-        &kernel,
-    );
+    check("Sphere", &sphere(), &kernel);
+    check("Pole", &pole(), &kernel);
     check("Camera", &camera(), &kernel);
     let dispatch = host!(DispatchRecord {
         region_origin,
@@ -289,6 +303,62 @@ fn a_light_about_its_centre_is_the_start_of_one_about_its_pole() {
         "{device:?}"
     );
     assert_eq!(mismatch(&light(), &device, true), None);
+}
+
+#[test]
+fn what_is_at_rest_is_the_start_of_what_moves() {
+    let names = FULL.into_iter().filter(|name| *name != "motion");
+    let kernel = kernel(Stage::Path, &names.collect::<Vec<_>>());
+    for (name, host) in [("Sphere", sphere()), ("Pole", pole()), ("Light", light())] {
+        let device = device(&kernel, name);
+        assert!(device.0.iter().all(|(name, _)| name != "motion"));
+        assert_eq!(mismatch(&host, &device, true), None, "{name}");
+    }
+}
+
+#[test]
+fn a_light_is_written_with_the_members_that_the_kernel_has() {
+    let record = LightRecord {
+        anchor: [1.0, 2.0, 3.0],
+        radius: 4.0,
+        pole: [5.0, 6.0, 7.0],
+        curvature: 8.0,
+        motion: [9.0, 10.0, 11.0],
+        sphere: 12,
+        ..bytemuck::Zeroable::zeroed()
+    };
+    for without in ["", "pole", "motion"] {
+        let names = FULL.into_iter().filter(|name| *name != without);
+        let kernel = kernel(Stage::Path, &names.collect::<Vec<_>>());
+        let (members, size) = device(&kernel, "Light");
+        let bytes = record.bytes(&members, size);
+        assert_eq!(bytes.len(), size as usize);
+        for (name, value) in [
+            ("anchor", 1.0),
+            ("radius", 4.0),
+            ("pole", 5.0),
+            ("curvature", 8.0),
+            ("motion", 9.0),
+        ] {
+            let Some((_, offset)) = members.iter().find(|(member, _)| member == name) else {
+                assert!(
+                    !without.is_empty() && value >= 5.0,
+                    "{name} without {without}"
+                );
+                continue;
+            };
+            let found: [u8; 4] = bytes[*offset as usize..][..4].try_into().expect("a number");
+            assert_eq!(f32::from_ne_bytes(found), value, "{name} without {without}");
+        }
+        assert_eq!(
+            members.len(),
+            match without {
+                "pole" => 7,
+                "motion" => 8,
+                _ => 9,
+            }
+        );
+    }
 }
 
 #[test]

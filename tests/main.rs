@@ -46,6 +46,7 @@ mod lights;
 mod limits;
 mod material_keys;
 mod materials;
+mod motion;
 mod naive;
 mod output;
 mod particles;

@@ -131,6 +131,7 @@ fn defaults_are_those_of_the_documentation() {
     assert_eq!(scene.camera.focus_distance, 4.0);
     assert_eq!(scene.environment, None, "black is no environment");
     assert_eq!((scene.render.spp, scene.render.max_bounces), (None, None));
+    assert!(!scene.moves());
 }
 
 #[test]
@@ -196,6 +197,12 @@ fn numbers_outside_of_their_range_are_refused() {
         mu = 10.0 | mu = -1.0 | 29:6 | `mu` must be at least 0
         radius = 0.1 | radius = -0.1 | 7:19 | `aperture_radius` must be at least 0
         focus_distance = 4.0 | focus_distance = 0 | 8:18 | greater than 0
+        distance = 4.0 | distance = 4.0\nshutter = [0, nan] | 9:15 | `shutter` must be a finite number
+        distance = 4.0 | distance = 4.0\nshutter = [0, 1e300] | 9:15 | `shutter` must be in
+        distance = 4.0 | distance = 4.0\nshutter = [1, 0.5] | 9:11 | help: `shutter = [0.5, 1.0]` opens first
+        distance = 4.0 | distance = 4.0\nshutter = [1] | 9:11 | exactly 2 numbers
+        radius = 1.0 | radius = 1.0\nvelocity = [0, inf, 0] | 33:16 | `velocity` must be a finite number
+        radius = 1.0 | radius = 1.0\nvelocity = 2 | 33:12 | write `[2, 2, 2]`
         width = 64 | width = 0 | 10:9 | an integer in [1, 65536]
         height = 48 | height = 65537 | 11:10 | an integer in [1, 65536]
         spp = 16 | spp = 0 | 13:7 | an integer in [1, 281474976710656]

@@ -67,6 +67,7 @@ pub(crate) fn crowd(count: usize) -> Scene {
     let mut random = Random::new("trees");
     let mut sphere = || Sphere {
         center: side * DVec3::from_array([(); 3].map(|()| random.range(0.0, 1.0))),
+        motion: DVec3::ZERO,
         radius: random.range(0.1, 0.4),
         material: 0,
         priority: None,

@@ -74,6 +74,8 @@ impl Bounds {
 struct Item {
     center: Vec3,
     radius: f32,
+    /// Half of its way, by coordinate.
+    way: Vec3,
     index: u32,
 }
 
@@ -81,8 +83,8 @@ impl Item {
     /// As good as the choice of parts needs; the boxes are found from the balls themselves.
     fn bounds(&self) -> Bounds {
         Bounds {
-            low: self.center - self.radius,
-            high: self.center + self.radius,
+            low: self.center - self.way - self.radius,
+            high: self.center + self.way + self.radius,
         }
     }
 }
@@ -95,6 +97,7 @@ pub(super) fn root(balls: &[Ball], options: Options) -> Option<Node> {
         .map(|(index, ball)| Item {
             center: ball.center,
             radius: ball.radius,
+            way: 0.5 * ball.motion.abs(),
             index,
         })
         .collect();
@@ -149,8 +152,10 @@ fn bounds_of(items: &[Item]) -> Bounds {
 fn extent(items: &[Item], options: Options) -> Extent {
     let bounds = bounds_of(items);
     let center = (0.5 * (bounds.low.as_dvec3() + bounds.high.as_dvec3())).as_vec3();
-    let reach =
-        |item: &Item| (item.center.as_dvec3() - center.as_dvec3()).abs() + f64::from(item.radius);
+    let reach = |item: &Item| {
+        let aside = (item.center.as_dvec3() - center.as_dvec3()).abs();
+        aside + item.way.as_dvec3() + f64::from(item.radius)
+    };
     let half = items.iter().map(reach).fold(DVec3::ZERO, DVec3::max) * options.scale;
     let half = half + options.slack * half.max_element();
     Extent {

@@ -14,16 +14,19 @@ const NODE: usize = 7;
 pub(super) struct Writer<'a> {
     balls: &'a [Ball],
     first: u32,
+    /// Whether leaves hold ways.
+    moves: bool,
     texels: Vec<[u32; 4]>,
     places: Vec<u32>,
 }
 
 impl<'a> Writer<'a> {
     /// A writer for trees over `balls`, the first of which has the number `first` in the kernel.
-    pub(super) fn new(balls: &'a [Ball], first: u32) -> Self {
+    pub(super) fn new(balls: &'a [Ball], first: u32, moves: bool) -> Self {
         Self {
             balls,
             first,
+            moves,
             texels: Vec::new(),
             places: vec![0; balls.len()],
         }
@@ -59,6 +62,11 @@ impl<'a> Writer<'a> {
             self.texels
                 .push(center.extend(radius).to_array().map(f32::to_bits));
             self.places[ball as usize] = place;
+        }
+        if self.moves {
+            let ways = whole.map(|ball| self.balls[ball as usize].motion.extend(0.0));
+            self.texels
+                .extend(ways.map(|way| way.to_array().map(f32::to_bits)));
         }
         at | LEAF
     }

@@ -2,8 +2,8 @@
 //! `shaders/scene/bvh.wesl` reads.
 //!
 //! A node has four boxes, so that few nodes lie between the root and a sphere, and is read as seven texels; a leaf
-//! has up to four spheres, whose numbers and themselves are five. Boxes hold exactly what the kernel tests:
-//! spheres in f32. What rounding does to a test of a box is in [`SLACK`], what it does to a ray in the kernel.
+//! has up to four spheres, whose numbers and themselves are five, and where any moves their ways four more. Boxes hold
+//! exactly what the kernel tests: spheres in f32, all along their ways. What rounding does to a test of a box is in [`SLACK`], what it does to a ray in the kernel.
 //!
 //! A builder of our own: sizes go up to 1e20, whose areas are infinite in the f32 of `obvhs` and its like; no
 //! number of coincident spheres may make a tree deeper than the kernel's stack; and the four-wide node comes from
@@ -32,8 +32,10 @@ pub const SLACK: f64 = 256.0 * (1.0 / 16_777_216.0);
 /// A sphere about its centre, as the kernel has it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ball {
-    /// In kernel units.
+    /// In kernel units, in the middle of its way.
     pub center: Vec3,
+    /// Its way.
+    pub motion: Vec3,
     /// Positive.
     pub radius: f32,
     /// Whether it is kept beside the tree, and tested by every ray: a sphere that paths are known to be in,
@@ -41,13 +43,15 @@ pub struct Ball {
     pub apart: bool,
 }
 
-/// How a tree is made, for tests of what happens to one that is made wrongly.
+/// How a tree is made; but for `moves`, for tests of what happens to one that is made wrongly.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Options {
     /// Boxes are as large as they must be, times this.
     pub scale: f64,
     /// What they are larger by beyond that; see [`SLACK`].
     pub slack: f64,
+    /// Whether leaves hold ways.
+    pub moves: bool,
 }
 
 impl Default for Options {
@@ -55,6 +59,7 @@ impl Default for Options {
         Self {
             scale: 1.0,
             slack: SLACK,
+            moves: false,
         }
     }
 }
@@ -77,7 +82,7 @@ pub struct Tree {
 }
 
 impl Tree {
-    /// A tree over `balls`, the first of which has the number `first` in the kernel.
+    /// A tree over `balls` at rest, the first of which has the number `first` in the kernel.
     #[must_use]
     pub fn new(balls: &[Ball], first: u32) -> Self {
         Self::with(balls, first, Options::default())
@@ -87,7 +92,7 @@ impl Tree {
     #[must_use]
     pub fn with(balls: &[Ball], first: u32, options: Options) -> Self {
         let root = build::root(balls, options);
-        let mut writer = layout::Writer::new(balls, first);
+        let mut writer = layout::Writer::new(balls, first, options.moves);
         let apart: Vec<u32> = (0..balls.len() as u32)
             .filter(|i| balls[*i as usize].apart)
             .collect();

@@ -72,7 +72,7 @@ pub(super) fn ulp(x: f64) -> f64 {
 }
 
 /// A ray from distance `distance` whose line passes the centre at `impact`: origin and direction.
-fn ray(random: &mut Random, distance: f64, impact: f64) -> (DVec3, DVec3) {
+pub(super) fn ray(random: &mut Random, distance: f64, impact: f64) -> (DVec3, DVec3) {
     let d = random.direction();
     let across = d.cross(random.direction()).normalize();
     let along = (distance * distance - impact * impact).max(0.0).sqrt();

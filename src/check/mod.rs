@@ -15,6 +15,7 @@ mod integrator;
 mod intersection;
 mod lights;
 mod materials;
+mod motion;
 mod placing;
 mod random;
 mod sampled;
@@ -58,7 +59,7 @@ pub struct Case {
 /// All cases, by number.
 #[must_use]
 pub fn cases() -> Vec<Case> {
-    let groups: [&[Case]; 13] = [
+    let groups: [&[Case]; 14] = [
         intersection::CASES,
         placing::CASES,
         lights::CASES,
@@ -69,6 +70,7 @@ pub fn cases() -> Vec<Case> {
         film::CASES,
         random::CASES,
         tree::CASES,
+        motion::CASES,
         variance::CASES,
         textures::CASES,
         dispersion::CASES,

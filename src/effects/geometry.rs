@@ -1,5 +1,7 @@
 //! Effects of where spheres, paths and the camera are.
 
+use glam::DVec3;
+
 use super::surfaces::forms_that;
 use super::{Effect, Row, when};
 use crate::placement::Side;
@@ -159,6 +161,14 @@ pub(super) fn rows() -> Vec<Row> {
             })
         })
         .marks(["lens_across", "lens_down", "lens_share", "focus"]),
+        Row::new(
+            Effect::Motion,
+            "motion",
+            "spheres that move while the shutter is open: a time for each path",
+            |asked| asked.placed(|s| (s.motion != DVec3::ZERO).then_some(", which moves")),
+        )
+        .needs(forms_that(|_| true))
+        .marks(["motion", "time", "anchors_apart", "TIME"]),
     ]
 }
 

@@ -50,6 +50,8 @@ pub enum Effect {
     Ulp,
     /// A thin lens.
     Lens,
+    /// Spheres that move while the shutter is open.
+    Motion,
     /// Scrambled Sobol' sequences.
     Sobol,
     /// Light by the kind of its path.

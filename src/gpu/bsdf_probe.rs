@@ -166,6 +166,7 @@ impl BsdfProbe {
 fn scene_of(materials: Vec<Material>) -> Scene {
     let ball = |i: usize| Sphere {
         center: DVec3::new(3.0 * i as f64, 0.0, 0.0),
+        motion: DVec3::ZERO,
         radius: 1.0,
         material: i,
         priority: None,

@@ -204,8 +204,8 @@ fn scene_data(
     let ends = members.iter().skip(1).map(|(_, offset)| *offset);
     for ((name, offset), end) in members.iter().zip(ends.chain([size])) {
         let array = match name.as_str() {
-            "spheres" => spheres(placement),
-            "poles" => poles(placement),
+            "spheres" => spheres(kernel, placement),
+            "poles" => poles(kernel, placement),
             "attributes" => attributes(scene, placement, effects),
             "materials" => materials(kernel, scene, placement, effects, textures),
             "patterns" => patterns(kernel, textures),
@@ -223,14 +223,25 @@ fn bytes_of<T: Pod>(records: impl Iterator<Item = T>) -> Vec<u8> {
     bytemuck::cast_slice(&records).to_vec()
 }
 
-fn spheres(placement: &Placement) -> Vec<u8> {
-    let centered = &placement.spheres[placement.poles..];
-    bytes_of(centered.iter().map(SphereRecord::new))
+/// The starts of records, as long as the kernel's struct `name`.
+fn starts_of<T: Pod>(kernel: &Kernel, name: &str, records: impl Iterator<Item = T>) -> Vec<u8> {
+    let (_, size) = kernel.struct_members(name).unwrap_or_default();
+    let mut bytes = Vec::new();
+    for record in records {
+        bytes.extend_from_slice(&bytemuck::bytes_of(&record)[..size as usize]);
+    }
+    bytes
 }
 
-fn poles(placement: &Placement) -> Vec<u8> {
+fn spheres(kernel: &Kernel, placement: &Placement) -> Vec<u8> {
+    let centered = placement.spheres[placement.poles..].iter();
+    starts_of(kernel, "Sphere", centered.map(SphereRecord::new))
+}
+
+fn poles(kernel: &Kernel, placement: &Placement) -> Vec<u8> {
     let poles = placement.spheres[..placement.poles].iter();
-    bytes_of(poles.filter_map(|s| Some(PoleRecord::new(s, s.pole?))))
+    let records = poles.filter_map(|s| Some(PoleRecord::new(s, s.pole?)));
+    starts_of(kernel, "Pole", records)
 }
 
 fn attributes(scene: &Scene, placement: &Placement, effects: &Effects) -> Vec<u8> {
@@ -294,20 +305,13 @@ fn materials(
 }
 
 fn patterns(kernel: &Kernel, textures: &TextureTable) -> Vec<u8> {
-    let (_, size) = kernel.struct_members("Pattern").unwrap_or_default();
-    let records = textures.patterns().iter();
-    records
-        .flat_map(|record| &bytemuck::bytes_of(record)[..size as usize])
-        .copied()
-        .collect()
+    starts_of(kernel, "Pattern", textures.patterns().iter().copied())
 }
 
 fn lights(kernel: &Kernel, placement: &Placement, effects: &Effects) -> Vec<u8> {
-    let (_, size) = kernel.struct_members("Light").unwrap_or_default();
-    let mut bytes = Vec::new();
-    for light in &placement.lights.table {
-        let record = LightRecord::new(light, placement, effects);
-        bytes.extend_from_slice(&bytemuck::bytes_of(&record)[..size as usize]);
-    }
-    bytes
+    let (members, size) = kernel.struct_members("Light").unwrap_or_default();
+    let lights = placement.lights.table.iter();
+    lights
+        .flat_map(|light| LightRecord::new(light, placement, effects).bytes(&members, size))
+        .collect()
 }

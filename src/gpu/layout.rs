@@ -4,6 +4,8 @@
 //! `Material` and `Attributes` lose the members that no effect in use needs: the former is written member
 //! by member at the offsets that naga reports, the latter, of words alone, in their order (`gpu/data.rs`).
 
+use std::mem::offset_of;
+
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 
@@ -19,7 +21,8 @@ use crate::scene::{Material, Scene};
 use crate::settings::Rect;
 use crate::shader::textures::smooth_kind;
 
-/// `Sphere` of `shaders/scene/list.wesl`: a sphere about its centre.
+/// `Sphere` of `shaders/scene/data.wesl`: a sphere about its centre. Where nothing moves, the kernel's struct ends
+/// before the way.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub struct SphereRecord {
@@ -27,6 +30,10 @@ pub struct SphereRecord {
     pub center: [f32; 3],
     /// Positive.
     pub radius: f32,
+    /// While the shutter is open.
+    pub motion: [f32; 3],
+    /// Padding.
+    pub unused: f32,
 }
 
 impl SphereRecord {
@@ -36,11 +43,14 @@ impl SphereRecord {
         Self {
             center: sphere.anchor.as_vec3().to_array(),
             radius: sphere.radius as f32,
+            motion: sphere.motion.as_vec3().to_array(),
+            unused: 0.0,
         }
     }
 }
 
-/// `Pole` of `shaders/scene/list.wesl`: a sphere about its pole.
+/// `Pole` of `shaders/scene/data.wesl`: a sphere about its pole. Where nothing moves, the kernel's struct ends before
+/// the way.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub struct PoleRecord {
@@ -52,6 +62,10 @@ pub struct PoleRecord {
     pub normal: [f32; 3],
     /// Padding.
     pub unused: f32,
+    /// While the shutter is open.
+    pub motion: [f32; 3],
+    /// Padding.
+    pub unused1: f32,
 }
 
 impl PoleRecord {
@@ -63,6 +77,8 @@ impl PoleRecord {
             curvature: (1.0 / sphere.radius) as f32,
             normal: normal.as_vec3().to_array(),
             unused: 0.0,
+            motion: sphere.motion.as_vec3().to_array(),
+            unused1: 0.0,
         }
     }
 }
@@ -79,7 +95,8 @@ pub(crate) fn light_weight(index: usize, placement: &Placement, effects: &Effect
         })
 }
 
-/// `Light` of `shaders/scene/data.wesl`. Without pole frames the kernel's struct ends before theirs.
+/// `Light` of `shaders/scene/data.wesl`. Without pole frames the kernel's struct has none of their members, and where
+/// nothing moves no way.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 #[expect(missing_docs, reason = "the members are those of the kernel's struct")]
@@ -92,6 +109,8 @@ pub struct LightRecord {
     pub sphere: u32,
     pub pole: [f32; 3],
     pub curvature: f32,
+    pub motion: [f32; 3],
+    pub unused: f32,
 }
 
 impl LightRecord {
@@ -111,7 +130,28 @@ impl LightRecord {
             sphere: light.sphere as u32,
             pole: sphere.pole.unwrap_or_default().as_vec3().to_array(),
             curvature: (1.0 / sphere.radius) as f32,
+            motion: sphere.motion.as_vec3().to_array(),
+            unused: 0.0,
         }
+    }
+
+    /// The record's bytes in a struct with these members, at these offsets, and this size.
+    #[must_use]
+    pub fn bytes(&self, members: &[(String, u32)], size: u32) -> Vec<u8> {
+        let own = bytemuck::bytes_of(self);
+        let mut bytes = vec![0; size as usize];
+        // Those that all have; then those about a pole, and the way.
+        let parts = [
+            ("anchor", 0..offset_of!(Self, pole)),
+            ("pole", offset_of!(Self, pole)..offset_of!(Self, motion)),
+            ("motion", offset_of!(Self, motion)..offset_of!(Self, unused)),
+        ];
+        for (name, part) in parts {
+            if let Some((_, offset)) = members.iter().find(|(member, _)| member == name) {
+                bytes[*offset as usize..][..part.len()].copy_from_slice(&own[part]);
+            }
+        }
+        bytes
     }
 }
 

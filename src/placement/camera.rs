@@ -31,16 +31,19 @@ pub struct PlacedCamera {
     pub lens_share: f64,
 }
 
-/// How far along the view axis nothing can be hit, for any ray of the camera.
+/// How far along the view axis nothing can be hit, for any ray of the camera at any time.
 pub(super) fn approach(scene: &Scene, forward: DVec3) -> f64 {
     let eye = scene.camera.position;
     let nearest = scene
         .spheres
         .iter()
-        .map(|s| (forward.dot(s.center - eye), s.radius))
+        .map(|s| {
+            let way = 0.5 * forward.dot(s.motion).abs();
+            (forward.dot(s.center - eye), s.radius + way)
+        })
         // What is wholly behind the lens is out of every ray's way.
-        .filter(|(depth, radius)| depth + radius > 0.0)
-        .map(|(depth, radius)| depth - radius)
+        .filter(|(depth, reach)| depth + reach > 0.0)
+        .map(|(depth, reach)| depth - reach)
         .fold(f64::INFINITY, f64::min);
     if nearest.is_finite() {
         nearest.max(0.0)

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::media::precedes;
 use super::sphere::{ROUNDING, Side};
-use super::tree::{Bounds, Tree};
+use super::tree::{Ball, Bounds, Tree};
 use crate::scene::{Scene, Sphere};
 
 /// Opaque spheres of either side that are looked at as containers: walls and shells are few and large,
@@ -31,13 +31,16 @@ const CLOSE: f64 = 1.0 / 1024.0;
 #[must_use]
 pub fn reachable(scene: &Scene, sides: &[Side], coincident: &mut Vec<[usize; 2]>) -> Vec<bool> {
     let mut reachable = vec![true; scene.spheres.len()];
-    let mut places: HashMap<[u64; 4], usize, BuildHasherDefault<FnvHasher>> = HashMap::default();
+    let mut places: HashMap<[u64; 7], usize, BuildHasherDefault<FnvHasher>> = HashMap::default();
     for (i, sphere) in scene.spheres.iter().enumerate() {
         let key = [
             sphere.center.x,
             sphere.center.y,
             sphere.center.z,
             sphere.radius,
+            sphere.motion.x,
+            sphere.motion.y,
+            sphere.motion.z,
         ];
         // -0 is 0.
         let first = *places.entry(key.map(|x| (x + 0.0).to_bits())).or_insert(i);
@@ -80,17 +83,17 @@ fn walls(scene: &Scene, sides: &[Side]) -> Vec<usize> {
     rooms.into_iter().chain(solids).collect()
 }
 
-/// Whether the opaque sphere `wall`, of which paths are on `side`, hides all of sphere `i`.
+/// Whether the opaque sphere `wall`, of which paths are on `side`, hides all of sphere `i` at all times.
 fn hides(scene: &Scene, wall: usize, side: Side, i: usize) -> bool {
     let (outer, inner) = (&scene.spheres[wall], &scene.spheres[i]);
-    let distance = outer.center.distance(inner.center);
+    let distances = outer.distances(inner);
     match side {
-        Side::Outside => distance + inner.radius <= outer.radius * (1.0 + ROUNDING),
+        Side::Outside => distances.most + inner.radius <= outer.radius * (1.0 + ROUNDING),
         Side::Inside => {
-            let around = distance + outer.radius <= inner.radius * (1.0 + ROUNDING);
+            let around = distances.most + outer.radius <= inner.radius * (1.0 + ROUNDING);
             // A dielectric around a room fills it.
             (around && !is_dielectric(scene, i))
-                || distance >= (outer.radius + inner.radius) * (1.0 - ROUNDING)
+                || distances.least >= (outer.radius + inner.radius) * (1.0 - ROUNDING)
         }
         Side::Tracked | Side::Sign => false,
     }
@@ -109,9 +112,7 @@ pub fn containers(scene: &Scene, sides: &[Side], reachable: &[bool]) -> Vec<Opti
         let radius = sphere(*a).radius.total_cmp(&sphere(*b).radius);
         radius.then(sphere(*a).center.x.total_cmp(&sphere(*b).center.x))
     });
-    let balls = outers
-        .iter()
-        .map(|i| (sphere(*i).center, sphere(*i).radius));
+    let balls = outers.iter().map(|i| Ball::of(sphere(*i)));
     let tree = Tree::new(&balls.collect::<Vec<_>>());
     for inner in placed().filter(|i| sides[*i] != Side::Sign) {
         let mut tightest = usize::MAX;
@@ -141,22 +142,24 @@ pub fn containers(scene: &Scene, sides: &[Side], reachable: &[bool]) -> Vec<Opti
     containers
 }
 
-/// Whether `inner` lies within `outer`, and their surfaces are close all around.
+/// Whether `inner` lies within `outer` at all times, and their surfaces are close all around at one.
 fn just_within(outer: &Sphere, inner: &Sphere) -> bool {
-    let distance = outer.center.distance(inner.center);
+    let distances = outer.distances(inner);
     let difference = outer.radius - inner.radius;
     let rounding = ROUNDING * outer.radius;
     let reach = CLOSE * outer.radius;
+    // Where roundings tie, as always.
+    let aside = 0.5 * (inner.motion.x - outer.motion.x).abs() + reach;
     difference > 0.0
-        && difference - distance >= -rounding
-        && difference + distance <= reach
-        && inner.center.x >= outer.center.x - reach
-        && inner.center.x <= outer.center.x + reach
+        && difference - distances.most >= -rounding
+        && difference + distances.least <= reach
+        && inner.center.x >= outer.center.x - aside
+        && inner.center.x <= outer.center.x + aside
 }
 
 /// Whether `inner` may lie just within a sphere within the bounds.
 fn may_hold(outers: &Bounds, inner: &Sphere) -> bool {
-    let distance = outers.nearest(inner.center);
+    let distance = outers.nearest(&Ball::of(inner));
     let [least, most] = [outers.least, outers.most].map(|radius| radius - inner.radius);
     most > 0.0
         && most - distance >= -(ROUNDING * outers.most)

@@ -5,7 +5,7 @@
 use std::collections::HashSet;
 
 use super::sphere::{PlacedSphere, Side};
-use super::tree::{Bounds, Tree};
+use super::tree::{Ball, Bounds, Tree};
 use crate::materials::luminance;
 use crate::scene::{Scene, Sphere};
 use crate::settings::{LightSampling, Offset};
@@ -61,7 +61,7 @@ fn sealed(scene: &Scene, lamps: &[usize]) -> Vec<bool> {
     let sphere = |i: usize| &scene.spheres[i];
     let kind = |i: &usize| &scene.materials[sphere(*i).material].kind;
     let tree = |some: &[usize]| {
-        let balls = some.iter().map(|i| (sphere(*i).center, sphere(*i).radius));
+        let balls = some.iter().map(|i| Ball::of(sphere(*i)));
         Tree::new(&balls.collect::<Vec<_>>())
     };
     if lamps.is_empty() {
@@ -98,7 +98,7 @@ fn sealed(scene: &Scene, lamps: &[usize]) -> Vec<bool> {
     let is_sealed = |lamp: &usize| {
         let inner = sphere(*lamp);
         let may_hold = |bounds: &Bounds| {
-            (bounds.nearest(inner.center) + inner.radius <= bounds.most).then_some(bounds.most)
+            (bounds.nearest(&Ball::of(inner)) + inner.radius <= bounds.most).then_some(bounds.most)
         };
         alone.contains(lamp)
             || clear_tree.any(may_hold, |ball| {
@@ -108,23 +108,24 @@ fn sealed(scene: &Scene, lamps: &[usize]) -> Vec<bool> {
     lamps.iter().map(is_sealed).collect()
 }
 
-/// Whether all of `inner` is in `outer`.
+/// Whether all of `inner` is in `outer` at all times.
 fn holds(outer: &Sphere, inner: &Sphere) -> bool {
-    inner.center.distance(outer.center) + inner.radius <= outer.radius
+    inner.distances(outer).most + inner.radius <= outer.radius
 }
 
-/// Whether some of the surface of `other` is in `glass`.
+/// Whether some of the surface of `other` is in `glass` at any time.
 fn reaches_into(glass: &Sphere, other: &Sphere) -> bool {
-    let distance = other.center.distance(glass.center);
-    let apart = distance >= glass.radius + other.radius;
-    let around = distance + glass.radius <= other.radius;
+    let distances = other.distances(glass);
+    let apart = distances.least >= glass.radius + other.radius;
+    let around = distances.most + glass.radius <= other.radius;
     !apart && !around
 }
 
 /// Whether a sphere within the bounds may reach into `glass`.
 fn may_reach_into(glass: &Sphere, bounds: &Bounds) -> bool {
-    let apart = bounds.nearest(glass.center) >= glass.radius + bounds.most;
-    let around = bounds.farthest(glass.center) + glass.radius <= bounds.least;
+    let ball = Ball::of(glass);
+    let apart = bounds.nearest(&ball) >= glass.radius + bounds.most;
+    let around = bounds.farthest(&ball) + glass.radius <= bounds.least;
     !apart && !around
 }
 
@@ -132,7 +133,7 @@ fn may_reach_into(glass: &Sphere, bounds: &Bounds) -> bool {
 /// distance would; what is beyond sends nothing into the picture.
 fn extent(spheres: &[PlacedSphere]) -> f64 {
     let centered = spheres.iter().filter(|s| s.pole.is_none());
-    let reach = centered.map(|s| s.anchor.length() + s.radius);
+    let reach = centered.map(|s| s.anchor.length() + s.radius + 0.5 * s.motion.length());
     let farthest = reach.fold(0.0, f64::max);
     // Of walls alone none is larger than another, in whatever unit.
     if farthest > 0.0 { farthest } else { 1.0 }

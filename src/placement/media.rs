@@ -7,8 +7,9 @@ use std::cmp::Ordering;
 use glam::DVec3;
 
 use super::sphere::ROUNDING;
-use super::tree::{Bounds, Tree};
+use super::tree::{self, Bounds, Tree};
 use crate::scene::Scene;
+use crate::scene::motion::Distances;
 
 /// The most levels: the kernel keeps the set of media a path is in as the bits of a word.
 pub const MAX_LEVELS: u32 = 32;
@@ -40,30 +41,38 @@ pub struct Medium {
 
 struct Ball {
     source: usize,
+    /// From the camera.
     center: DVec3,
+    motion: DVec3,
     radius: f64,
     ior: f64,
 }
 
 impl Ball {
-    /// Whether the two share a point. (Where they just touch beside each other along x, rounding decides twice.)
+    /// Whether the two share a point at any time. (Where they just touch beside each other along x, rounding decides
+    /// twice.)
     fn meets(&self, other: &Self) -> bool {
-        self.center.distance(other.center) <= self.radius + other.radius
+        let distances = Distances::of(self.center - other.center, self.motion - other.motion);
+        distances.least <= self.radius + other.radius
             && self.left() <= other.right()
             && other.left() <= self.right()
     }
 
     /// Whether a ball within the bounds may meet it.
     fn may_meet(&self, bounds: &Bounds) -> bool {
-        bounds.nearest(self.center) <= self.radius + bounds.most
+        bounds.nearest(&self.as_asked()) <= self.radius + bounds.most
+    }
+
+    fn as_asked(&self) -> tree::Ball {
+        tree::Ball::new(self.center, self.radius, self.motion)
     }
 
     fn left(&self) -> f64 {
-        self.center.x - self.radius
+        self.center.x - 0.5 * self.motion.x.abs() - self.radius
     }
 
     fn right(&self) -> f64 {
-        self.center.x + self.radius
+        self.center.x + 0.5 * self.motion.x.abs() + self.radius
     }
 }
 
@@ -82,13 +91,14 @@ impl Media {
             .map(|(source, s, kind)| Ball {
                 source,
                 center: s.center - scene.camera.position,
+                motion: s.motion,
                 radius: s.radius,
                 ior: kind.ior(),
             })
             .collect();
         // From low to high precedence.
         balls.sort_by(|a, b| precedence(scene, a.source, b.source));
-        let places: Vec<(DVec3, f64)> = balls.iter().map(|b| (b.center, b.radius)).collect();
+        let places: Vec<tree::Ball> = balls.iter().map(Ball::as_asked).collect();
         // A ball's mark is one above its level; balls of higher precedence have none yet.
         let mut tree = Tree::new(&places);
         let mut media = Self {
@@ -114,7 +124,8 @@ impl Media {
             if level > 0 {
                 media.levels = media.levels.max(level + 1);
             }
-            if ball.center.length() < ball.radius * (1.0 - ROUNDING) {
+            // It is at all times or at none.
+            if Distances::of(ball.center, ball.motion).least < ball.radius * (1.0 - ROUNDING) {
                 media.camera.push(Medium {
                     level,
                     ior: ball.ior,

@@ -26,7 +26,7 @@ use std::sync::{Arc, OnceLock};
 
 use glam::DVec3;
 
-use crate::bvh::{Ball, Tree};
+use crate::bvh::{Ball, Options, Tree};
 use crate::scene::{Scene, Sky};
 use crate::settings::Offset;
 use camera::approach;
@@ -115,6 +115,7 @@ impl Placement {
                     source: i,
                     material: sphere.material,
                     anchor: anchor * scale,
+                    motion: sphere.motion * scale,
                     radius: sphere.radius * scale,
                     pole: normal,
                     side: sides[i],
@@ -163,7 +164,7 @@ impl Placement {
     #[must_use]
     pub fn tree(&self) -> &Tree {
         self.tree
-            .get_or_init(|| Tree::new(&self.balls(), self.poles as u32))
+            .get_or_init(|| Tree::with(&self.balls(), self.poles as u32, self.tree_options()))
     }
 
     /// What light sampling draws directions to the scene's image from.
@@ -186,12 +187,28 @@ impl Placement {
         self
     }
 
+    /// How that tree is made.
+    #[must_use]
+    pub fn tree_options(&self) -> Options {
+        Options {
+            moves: self.moves(),
+            ..Options::default()
+        }
+    }
+
+    /// Whether any sphere moves while the shutter is open.
+    #[must_use]
+    pub fn moves(&self) -> bool {
+        self.spheres.iter().any(|s| s.motion != DVec3::ZERO)
+    }
+
     /// What is in the tree, or beside it.
     #[must_use]
     pub fn balls(&self) -> Vec<Ball> {
         let centered = &self.spheres[self.poles..];
         let ball = |sphere: &PlacedSphere| Ball {
             center: sphere.anchor.as_vec3(),
+            motion: sphere.motion.as_vec3(),
             radius: sphere.radius as f32,
             apart: sphere.side == Side::Inside,
         };

@@ -4,8 +4,7 @@ use glam::DVec3;
 
 use crate::scene::Scene;
 
-/// Rounding of the sum of a distance and a radius in f64, as a share of it.
-pub(super) const ROUNDING: f64 = 4.0 * f64::EPSILON;
+pub(super) use crate::scene::motion::ROUNDING;
 
 /// A sphere in kernel units, relative to the placement's origin.
 #[derive(Clone, Debug, PartialEq)]
@@ -14,8 +13,10 @@ pub struct PlacedSphere {
     pub source: usize,
     /// Index into the scene's materials.
     pub material: usize,
-    /// The centre, or the pole.
+    /// The centre, or the pole, in the middle of the time for which the shutter is open.
     pub anchor: DVec3,
+    /// Its way in that time, in kernel units: at the time t, from -1/2 to 1/2, the anchor is at `anchor + t motion`.
+    pub motion: DVec3,
     /// Radius, in kernel units.
     pub radius: f64,
     /// Outward unit normal at the pole, if the sphere has a pole frame.
@@ -61,18 +62,19 @@ pub enum Side {
 }
 
 impl Side {
-    /// The side of sphere `i` of `scene` on which paths can be, where they leave surfaces exactly.
+    /// The side of sphere `i` of `scene` on which paths can be, where they leave surfaces exactly. It is the same for
+    /// all of the time for which the shutter is open: no sphere moves over the camera.
     #[must_use]
     pub fn of(scene: &Scene, i: usize) -> Self {
         let sphere = &scene.spheres[i];
-        let distance = scene.camera.position.distance(sphere.center);
+        let distances = sphere.distances_from(scene.camera.position);
         let lens = scene.camera.aperture_radius;
-        if lens > 0.0 && (distance - sphere.radius).abs() <= lens {
+        if lens > 0.0 && distances.gap(sphere.radius) <= lens {
             return Self::Sign;
         }
         if scene.materials[sphere.material].kind.transmits() {
             Self::Tracked
-        } else if distance >= sphere.radius * (1.0 - ROUNDING) {
+        } else if distances.least >= sphere.radius * (1.0 - ROUNDING) {
             // A camera on the surface sees it from outside.
             Self::Outside
         } else {

@@ -2,7 +2,8 @@
 //!
 //! No answer may depend on the tree: each is that of asking every ball in turn, bit for bit. What a box of
 //! balls can answer at most is computed by the very operations that its balls are asked with, and these
-//! (differences, products, sums, square roots) are monotone in f64: a bound needs no margin for rounding.
+//! (differences, products, sums, square roots) are monotone in f64: a bound needs no margin for rounding. Balls that
+//! move are asked with others, and are taken for boxes that hold their ways with such a margin.
 //!
 //! A question takes the time of a logarithm of all and of what comes near: balls that a box cannot rule out, such as
 //! many large surfaces that just miss one small ball, are asked one by one. Of dielectrics such a crowd is refused
@@ -14,11 +15,41 @@
 
 use glam::DVec3;
 
+use crate::scene::Sphere;
+
 /// Balls in one leaf.
 const LEAF: usize = 8;
 
 /// Balls from which on the halves of a node are built side by side.
 const PARALLEL: usize = 16384;
+
+/// By how much more than half of its way a moving ball is taken to move to either side, as a share of it; and by how
+/// much less or more distances from it are taken to be. Both are far above the roundings of f64.
+const MARGIN: f64 = 1.0 / 1_048_576.0;
+
+/// A ball, at rest or on a straight way.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ball {
+    /// In the middle of the way.
+    center: DVec3,
+    radius: f64,
+    /// How far it gets from there, by coordinate; 0 at rest, else with the margin.
+    reach: DVec3,
+}
+
+impl Ball {
+    pub(super) fn of(sphere: &Sphere) -> Self {
+        Self::new(sphere.center, sphere.radius, sphere.motion)
+    }
+
+    pub(super) fn new(center: DVec3, radius: f64, motion: DVec3) -> Self {
+        Self {
+            center,
+            radius,
+            reach: 0.5 * (1.0 + MARGIN) * motion.abs(),
+        }
+    }
+}
 
 /// What is known of some balls together.
 #[derive(Clone, Copy, Debug)]
@@ -27,6 +58,8 @@ pub(super) struct Bounds {
     low: DVec3,
     /// Greatest coordinates of the centres.
     high: DVec3,
+    /// Whether any moves.
+    moves: bool,
     /// The least radius.
     pub(super) least: f64,
     /// The greatest radius.
@@ -38,20 +71,26 @@ pub(super) struct Bounds {
 }
 
 impl Bounds {
-    fn of(balls: &[(DVec3, f64)], items: &[usize]) -> Self {
+    fn of(balls: &[Ball], items: &[usize]) -> Self {
         let nothing = Self {
             low: DVec3::INFINITY,
             high: DVec3::NEG_INFINITY,
+            moves: false,
             least: f64::INFINITY,
             most: 0.0,
             first: usize::MAX,
             mark: 0,
         };
         items.iter().fold(nothing, |all, &i| {
-            let (center, radius) = balls[i];
+            let Ball {
+                center,
+                radius,
+                reach,
+            } = balls[i];
             Self {
-                low: all.low.min(center),
-                high: all.high.max(center),
+                low: all.low.min(center - reach),
+                high: all.high.max(center + reach),
+                moves: all.moves || reach != DVec3::ZERO,
                 least: all.least.min(radius),
                 most: all.most.max(radius),
                 first: all.first.min(i),
@@ -60,16 +99,27 @@ impl Bounds {
         })
     }
 
-    /// No centre's distance from `point` is less.
-    pub(super) fn nearest(&self, point: DVec3) -> f64 {
-        let gap = (self.low - point).max(point - self.high);
-        gap.max(DVec3::ZERO).length()
+    /// No centre's distance from that of `ball` is less, at any time.
+    pub(super) fn nearest(&self, ball: &Ball) -> f64 {
+        let (low, high) = (ball.center - ball.reach, ball.center + ball.reach);
+        let gap = (self.low - high).max(low - self.high);
+        gap.max(DVec3::ZERO).length() * (1.0 - self.margin(ball))
     }
 
-    /// No centre's distance from `point` is greater.
-    pub(super) fn farthest(&self, point: DVec3) -> f64 {
-        let gap = (self.low - point).abs().max((self.high - point).abs());
-        gap.length()
+    /// No centre's distance from that of `ball` is greater, at any time.
+    pub(super) fn farthest(&self, ball: &Ball) -> f64 {
+        let (low, high) = (ball.center - ball.reach, ball.center + ball.reach);
+        let gap = (self.low - high).abs().max((self.high - low).abs());
+        gap.length() * (1.0 + self.margin(ball))
+    }
+
+    /// For distances from `ball`.
+    fn margin(&self, ball: &Ball) -> f64 {
+        if self.moves || ball.reach != DVec3::ZERO {
+            MARGIN
+        } else {
+            0.0
+        }
     }
 }
 
@@ -96,7 +146,7 @@ impl Node {
 }
 
 /// Adds the node of `items`, which are those from `from` on, and all below it to `nodes`.
-fn build(nodes: &mut Vec<Node>, balls: &[(DVec3, f64)], items: &mut [usize], from: usize) {
+fn build(nodes: &mut Vec<Node>, balls: &[Ball], items: &mut [usize], from: usize) {
     let node = nodes.len();
     let bounds = Bounds::of(balls, items);
     nodes.push(Node {
@@ -112,7 +162,7 @@ fn build(nodes: &mut Vec<Node>, balls: &[(DVec3, f64)], items: &mut [usize], fro
     let wide = (bounds.high - bounds.low).extend(bounds.most - bounds.least);
     let axis = wide.max_position();
     let key = |ball: &usize| {
-        let (center, radius) = balls[*ball];
+        let Ball { center, radius, .. } = balls[*ball];
         center.extend(radius)[axis]
     };
     let half = items.len() / 2;
@@ -152,8 +202,8 @@ pub(super) struct Tree {
 }
 
 impl Tree {
-    /// A tree of balls, as centre and radius.
-    pub(super) fn new(balls: &[(DVec3, f64)]) -> Self {
+    /// A tree of balls.
+    pub(super) fn new(balls: &[Ball]) -> Self {
         let mut items: Vec<usize> = (0..balls.len()).collect();
         let mut nodes = Vec::new();
         if !items.is_empty() {
@@ -246,23 +296,27 @@ mod tests {
     use super::*;
     use crate::verify::Random;
 
-    fn balls(count: usize) -> Vec<(DVec3, f64)> {
+    fn balls(count: usize) -> Vec<Ball> {
         let mut random = Random::new("balls in a tree of the placement");
         let mut ball = || {
             let [x, y, z, r] = random.unit4().map(f64::from);
-            (DVec3::new(x, y, z), r)
+            at(DVec3::new(x, y, z), r)
         };
         (0..count).map(|_| ball()).collect()
     }
 
+    fn at(center: DVec3, radius: f64) -> Ball {
+        Ball::new(center, radius, DVec3::ZERO)
+    }
+
     /// The nearest of the balls to a point, by the tree.
-    fn nearest(tree: &Tree, balls: &[(DVec3, f64)], point: DVec3) -> usize {
+    fn nearest(tree: &Tree, balls: &[Ball], point: DVec3) -> usize {
         let mut answer = (f64::INFINITY, 0);
         tree.search(
             &mut answer,
-            |(best, _), bounds| Some(-bounds.nearest(point)).filter(|near| -near < *best),
+            |(best, _), bounds| Some(-bounds.nearest(&at(point, 0.0))).filter(|near| -near < *best),
             |answer, ball| {
-                let distance = balls[ball].0.distance(point);
+                let distance = balls[ball].center.distance(point);
                 if distance < answer.0 {
                     *answer = (distance, ball);
                 }
@@ -293,10 +347,10 @@ mod tests {
         let points: Vec<DVec3> = balls
             .iter()
             .step_by(4001)
-            .map(|b| b.0 * 1.1 - 0.05)
+            .map(|b| b.center * 1.1 - 0.05)
             .collect();
         for point in &points {
-            let distance = |ball: &usize| balls[*ball].0.distance(*point);
+            let distance = |ball: &usize| balls[*ball].center.distance(*point);
             let brute = (0..balls.len()).min_by(|a, b| distance(a).total_cmp(&distance(b)));
             assert_eq!(Some(nearest(&tree, &balls, *point)), brute);
         }
@@ -305,7 +359,7 @@ mod tests {
         // Companion: with the second half of the root taken for a part of the first, answers are missed.
         tree.nodes[0].second = Some(1);
         let missed = points.iter().filter(|point| {
-            let distance = |ball: usize| balls[ball].0.distance(**point);
+            let distance = |ball: usize| balls[ball].center.distance(**point);
             let found = distance(nearest(&tree, &balls, **point));
             (0..balls.len()).any(|ball| distance(ball) < found)
         });

@@ -15,9 +15,13 @@ pub(super) fn length(
     let extent = all
         .iter()
         .map(|&i| match poles[i] {
-            Some(n) => pole_point(centers[i], scene.spheres[i].radius, n).length(),
-            None => centers[i].length() + scene.spheres[i].radius,
+            Some(n) => (
+                i,
+                pole_point(centers[i], scene.spheres[i].radius, n).length(),
+            ),
+            None => (i, centers[i].length() + scene.spheres[i].radius),
         })
+        .map(|(i, reach)| reach + 0.5 * scene.spheres[i].motion.length())
         .fold(0.0, f64::max);
     if extent > 0.0 {
         (-extent.log2().floor()).exp2()

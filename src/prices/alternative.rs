@@ -74,6 +74,12 @@ fn change(
             scene.camera.aperture_radius = 0.0;
             "a pinhole"
         }
+        Effect::Motion => {
+            for sphere in &mut scene.spheres {
+                sphere.motion = DVec3::ZERO;
+            }
+            "spheres at rest in the middle of their ways"
+        }
         Effect::Sobol => {
             settings.sampler = Sampler::Independent;
             "--sampler independent"

@@ -39,7 +39,8 @@ fn check(effect: Effect) -> Told<()> {
         | Effect::Table
         | Effect::Mis
         | Effect::Roulette => Err("linked in, it would be in use".into()),
-        Effect::Gradient
+        Effect::Motion
+        | Effect::Gradient
         | Effect::Sky
         | Effect::TextureChecker
         | Effect::TextureNoise

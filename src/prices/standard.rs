@@ -76,6 +76,7 @@ pub fn standard(effect: Effect) -> (Scene, Settings) {
         Effect::Nudge => settings.offset = Offset::Out(1.0e-4),
         Effect::Ulp => settings.offset = Offset::Ulp,
         Effect::Lens => scene.camera.aperture_radius = 0.05,
+        Effect::Motion => scene.spheres[0].motion = DVec3::new(0.5, 0.25, 0.0),
         Effect::Classes => settings.classes = true,
         Effect::Features => settings.features = true,
         Effect::Form(code) => {

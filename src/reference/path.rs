@@ -9,7 +9,7 @@ use super::light::aim::aim_at;
 use super::light::environment::{environment_radiance, sky_place};
 use super::light::skylight::{NO_SPHERE, SKY_SHARE, sample_sky, sky_density};
 use super::light::sphere::{LightSample, light_pdf, mis_weight, sample_light};
-use super::purpose::{CAMERA, WAVELENGTH, lighting, scattering};
+use super::purpose::{CAMERA, TIME, WAVELENGTH, lighting, scattering};
 use super::scene::absorption::transmittance;
 use super::scene::camera::camera_ray;
 use super::scene::priority::{Media, cross_surface, filling, index_within, relative_index};
@@ -132,6 +132,7 @@ impl PathTracer<'_> {
             class: LightClass::Emission,
             found: PathResult::default(),
         };
+        path.ray.time = random(TIME)[0] - 0.5;
         while self.extend(&mut path, &random) {}
         path.found
     }
@@ -367,7 +368,7 @@ impl PathTracer<'_> {
             return 1.0;
         };
         let sphere = &self.placement.spheres[hit.index];
-        let aim = aim_at(sphere, ray.anchor, ray.offset);
+        let aim = aim_at(sphere, ray.anchor, ray.offset, ray.motion, ray.time);
         let pdf_per_weight =
             (!lights.from_table(self.settings.light_sampling)).then_some(from.pdf_per_weight);
         let share = self.sky().map_or(1.0, |_| 1.0 - SKY_SHARE);

@@ -4,7 +4,10 @@
 /// Place in the pixel (x, y) and on the lens (z, w).
 pub const CAMERA: u32 = 0;
 
-/// Time (x), wavelength (y).
+/// Time (x).
+pub const TIME: u32 = 1;
+
+/// Wavelength (y).
 pub const WAVELENGTH: u32 = 1;
 
 /// A scattering event: direction (x, y), lobe (z), roulette (w).

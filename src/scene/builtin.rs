@@ -80,6 +80,11 @@ pub const GALLERY: &[Builtin] = &[
         description: "coloured caustics of glass whose index depends on the wavelength",
         text: include_str!("../../scenes/prism.toml"),
     },
+    Builtin {
+        name: "motion",
+        description: "balls that roll, fall and fly, and a lamp that does, while the shutter is open",
+        text: include_str!("../../scenes/motion.toml"),
+    },
 ];
 
 /// The names of the built-in scenes, the default one first.

@@ -63,7 +63,26 @@ fn write(text: &mut String, loaded: &Loaded) -> fmt::Result {
         )?;
     }
     textures(text, scene)?;
+    motion(text, scene)?;
     lights(text, scene)
+}
+
+fn motion(text: &mut String, scene: &Scene) -> fmt::Result {
+    let moving = scene.spheres.iter().map(|sphere| sphere.motion);
+    let moving: Vec<f64> = moving
+        .filter(|motion| *motion != DVec3::ZERO)
+        .map(DVec3::length)
+        .collect();
+    if moving.is_empty() {
+        return Ok(());
+    }
+    let longest = moving.iter().copied().fold(0.0, f64::max);
+    writeln!(
+        text,
+        "motion       {}, by up to {} while the shutter is open",
+        counted(moving.len(), "sphere"),
+        significant(longest)
+    )
 }
 
 fn textures(text: &mut String, scene: &Scene) -> fmt::Result {

@@ -89,6 +89,11 @@ pub(super) struct CameraTable {
     #[serde(default)]
     #[schemars(with = "f64", range(max = MAX_MAGNITUDE), extend("exclusiveMinimum" = 0.0))]
     pub(super) focus_distance: Option<Spanned<f64>>,
+    /// When the shutter opens and closes; spheres with a `velocity` are at center + t velocity, t from the one to
+    /// the other.
+    #[serde(default)]
+    #[schemars(schema_with = "ends", extend("default" = [0.0, 0.0]))]
+    pub(super) shutter: Option<Spanned<[f64; 2]>>,
 }
 
 /// Which way image right is.
@@ -246,9 +251,13 @@ impl JsonSchema for MaterialTable {
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct SphereTable {
-    /// Its centre.
+    /// Its centre, at time 0.
     #[schemars(schema_with = "point")]
     pub(super) center: [f64; 3],
+    /// Its velocity: at time t it is at center + t velocity.
+    #[serde(default)]
+    #[schemars(schema_with = "point", extend("default" = [0.0, 0.0, 0.0]))]
+    pub(super) velocity: Option<Spanned<[f64; 3]>>,
     /// Its radius.
     #[schemars(with = "f64", range(max = MAX_MAGNITUDE), extend("exclusiveMinimum" = 0.0))]
     pub(super) radius: Spanned<f64>,

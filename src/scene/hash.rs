@@ -14,7 +14,8 @@ use crate::materials::{MaterialKind, Value};
 
 /// Hash of everything in the scene that the image depends on: 16 hexadecimal digits.
 ///
-/// Camera, image size, environment and every sphere with the values of its material count. Names
+/// Camera, image size, environment and every sphere with its way while the shutter is open and the values of its
+/// material count. Names
 /// and order of materials, unused materials, the options of `[render]`, comments and the way
 /// numbers are written do not. FNV-1a with 64 bits over the values' little-endian bytes: stable
 /// over machines and versions, good against accidents, not against forgery.
@@ -42,6 +43,10 @@ pub fn content_hash(scene: &Scene) -> String {
     for sphere in &scene.spheres {
         hash.vector(sphere.center);
         hash.number(sphere.radius);
+        if sphere.motion != DVec3::ZERO {
+            hash.bytes(b"motion");
+            hash.vector(sphere.motion);
+        }
         hash.bytes(&i64::from(sphere.priority.unwrap_or_default()).to_le_bytes());
         hash.byte(u8::from(sphere.priority.is_some()));
         let material = &scene.materials[sphere.material];
@@ -244,7 +249,7 @@ mod tests {
                 ..scene()
             })
             .into();
-        let changes: [fn(&mut Scene); 14] = [
+        let changes: [fn(&mut Scene); 16] = [
             |scene| scene.camera.position.x = 1e-300,
             |scene| scene.camera.look_at.y = 1.0,
             |scene| scene.camera.up.z = 1.0,
@@ -256,6 +261,8 @@ mod tests {
             |scene| scene.environment = None,
             |scene| scene.spheres[0].center.x = 1.0,
             |scene| scene.spheres[1].radius = 2.0,
+            |scene| scene.spheres[1].motion.y = 1.0,
+            |scene| scene.spheres[2].motion.y = 1.0,
             |scene| scene.spheres[0].priority = None,
             |scene| scene.materials[3].emission.y = 1.0,
             |scene| scene.spheres.swap(0, 1),

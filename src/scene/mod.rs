@@ -12,6 +12,7 @@ mod hash;
 mod image;
 pub mod load;
 pub mod material;
+pub mod motion;
 pub mod particles;
 mod pieces;
 #[cfg(test)]
@@ -54,6 +55,14 @@ pub struct Scene {
     pub spheres: Vec<Sphere>,
 }
 
+impl Scene {
+    /// Whether any sphere moves while the shutter is open.
+    #[must_use]
+    pub fn moves(&self) -> bool {
+        self.spheres.iter().any(|s| s.motion != DVec3::ZERO)
+    }
+}
+
 /// Rendering options that a scene file may set.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RenderDefaults {
@@ -94,8 +103,10 @@ pub enum Handedness {
 /// A sphere.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sphere {
-    /// Its centre.
+    /// Its centre in the middle of the time for which the shutter is open.
     pub center: DVec3,
+    /// Its way in that time: from `center - motion/2` to `center + motion/2`.
+    pub motion: DVec3,
     /// Its radius; positive.
     pub radius: f64,
     /// Index into [`Scene::materials`].

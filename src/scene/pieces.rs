@@ -102,6 +102,9 @@ fn list(text: &str, start: usize) -> Option<Vec<SphereTable>> {
         if let Some(priority) = &mut sphere.priority {
             move_by(start, priority);
         }
+        if let Some(velocity) = &mut sphere.velocity {
+            move_by(start, velocity);
+        }
     }
     Some(sphere)
 }
@@ -147,8 +150,7 @@ height = 4
 type = \"diffuse\"
 albedo = [0.5, 0.5, 0.5]
 ";
-    const SPHERE: &str =
-        "[[sphere]]\ncenter = [1, 2, 3]  # a comment\nradius = 0.5\nmaterial = \"a\"\n";
+    const SPHERE: &str = "[[sphere]]\ncenter = [1, 2, 3]  # a comment\nvelocity = [0, 1, 0]\nradius = 0.5\nmaterial = \"a\"\n";
 
     /// By pieces of two spheres, and as a whole.
     fn both(text: &str) -> (Option<String>, Option<String>) {

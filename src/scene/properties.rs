@@ -201,6 +201,7 @@ fn scene() -> impl Strategy<Value = Scene> {
                     let glass = materials[material].kind.transmits();
                     Sphere {
                         center,
+                        motion: DVec3::ZERO,
                         radius,
                         material,
                         priority: priority.filter(|_| glass),

@@ -34,6 +34,7 @@ pub(super) fn geometry(placement: &Placement, effects: &Effects) -> String {
     }
     let any = |sides: &[Side]| placement.spheres.iter().any(|s| sides.contains(&s.side));
     for (used, name) in [
+        (effects.has(Effect::Motion), "scene::ray::anchors_apart"),
         (any(&[Side::Outside]), "scene::sphere::root_outside"),
         (any(&[Side::Inside]), "scene::sphere::root_interior"),
         (
@@ -66,6 +67,9 @@ pub(super) fn attributes(scene: &Scene, placement: &Placement, effects: &Effects
                  import package::light::aim::aim_center;\n";
         if effects.has(Effect::Pole) {
             text += "import package::light::aim::aim_pole;\n";
+        }
+        if effects.has(Effect::Motion) {
+            text += "import package::scene::ray::anchors_apart;\n";
         }
     }
     frame_of(&mut text, placement, effects);
@@ -116,11 +120,11 @@ fn closest_hit(text: &mut String, placement: &Placement, effects: &Effects) {
         let reach = reach.map_or_else(String::new, |r| format!("let can_be_hit = {r};\n"));
         let _ = write!(
             text,
-            "{{\nlet x = (ray.anchor - {}) + ray.offset;\nlet q = {quadratic};\n\
+            "{{\nlet x = {} + ray.offset;\nlet q = {quadratic};\n\
              let own = ray.own == {i}u;\n{known}let t = {root};\n{reach}\
              let closer = {closer};\nhit.t = select(hit.t, t, closer);\n\
              hit.index = select(hit.index, {i}u, closer);\n",
-            vector(sphere.anchor),
+            from_anchor("ray", sphere, effects),
         );
         if interior {
             *text += "hit.inside = select(hit.inside, inside, closer);\n";
@@ -128,6 +132,16 @@ fn closest_hit(text: &mut String, placement: &Placement, effects: &Effects) {
         *text += "}\n";
     }
     *text += "return hit;\n}\n";
+}
+
+/// The vector from a sphere's anchor to that of a ray or vertex `of`, at its time.
+fn from_anchor(of: &str, sphere: &PlacedSphere, effects: &Effects) -> String {
+    let anchor = vector(sphere.anchor);
+    if effects.has(Effect::Motion) {
+        let motion = vector(sphere.motion);
+        return format!("anchors_apart({anchor}, {of}.anchor, {motion}, {of}.motion, {of}.time)");
+    }
+    format!("({of}.anchor - {anchor})")
 }
 
 /// Whether the ray runs inside the dielectric `index`.
@@ -190,6 +204,9 @@ fn frame_of(text: &mut String, placement: &Placement, effects: &Effects) {
         "frame.radius",
         &each(&|s| number(if s.pole.is_some() { 0.0 } else { s.radius })),
     );
+    if effects.has(Effect::Motion) {
+        choose(text, "frame.motion", &each(&|s| vector(s.motion)));
+    }
     *text += "return frame;\n}\n";
 }
 
@@ -235,10 +252,7 @@ fn light_weights(text: &mut String, placement: &Placement, effects: &Effects) {
               var chosen: Weighed;\nchosen.v = u;\n";
     for light in &placement.lights.table {
         let sphere = &placement.spheres[light.sphere];
-        let x = format!(
-            "(vertex.anchor - {}) + vertex.offset",
-            vector(sphere.anchor)
-        );
+        let x = format!("{} + vertex.offset", from_anchor("vertex", sphere, effects));
         let aim = match sphere.pole {
             Some(normal) => format!(
                 "aim_pole({x}, {}, {})",

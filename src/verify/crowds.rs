@@ -98,6 +98,7 @@ impl Crowd {
             source,
             material: 0,
             anchor: center.as_dvec3(),
+            motion: DVec3::ZERO,
             radius: f64::from(*radius),
             pole: None,
             side,

@@ -115,8 +115,9 @@ const MATERIALS: &str = r#"
     material.shiny = { type = "mirror", reflectance = [0.9, 0.9, 0.9], emission = [0, 0, 9] }
 "#;
 
-/// A scene of `count` spheres that lie in all ways to each other; `glass` is the share of dielectrics.
-fn random_scene(random: &mut Random, count: usize, glass: f64) -> Scene {
+/// A scene of `count` spheres that lie in all ways to each other; `glass` is the share of dielectrics; whether some
+/// are `moving`.
+fn random_scene(random: &mut Random, count: usize, glass: f64, moving: bool) -> Scene {
     let mut scene = load_str("random", MATERIALS)
         .unwrap_or_else(|e| panic!("{e}"))
         .scene;
@@ -140,6 +141,7 @@ fn random_scene(random: &mut Random, count: usize, glass: f64) -> Scene {
         let known = scene.spheres.get(known as usize).copied();
         let fresh = Sphere {
             center: far + place + spread * random.direction() * random.unit(),
+            motion: DVec3::ZERO,
             radius: random.magnitude(-decades, 0.0),
             material: 0,
             priority: None,
@@ -199,6 +201,11 @@ fn random_scene(random: &mut Random, count: usize, glass: f64) -> Scene {
         let kind = &scene.materials[sphere.material].kind;
         let chosen = kind.transmits() && random.unit() < 0.2;
         sphere.priority = chosen.then(|| random.range(-3.0, 3.0) as i32);
+        // Some spheres move, some of them together with the one that they lie to.
+        if moving && random.unit() < 0.5 {
+            let way = random.magnitude(-4.0, 1.0) * sphere.radius;
+            sphere.motion = way * direction(random);
+        }
         if sphere.radius > 0.0 {
             scene.spheres.push(sphere);
         }
@@ -222,10 +229,14 @@ fn random_scenes(name: &str) -> impl Iterator<Item = (String, Scene)> {
     let sizes = std::iter::repeat_n(10, 150)
         .chain(std::iter::repeat_n(40, 100))
         .chain(std::iter::repeat_n(200, 30))
-        .chain([700, 700, 2000, 2000]);
-    sizes.enumerate().map(move |(i, count)| {
+        .chain([700, 700, 2000, 2000])
+        .map(|count| (count, false))
+        // Spheres that move.
+        .chain(std::iter::repeat_n((40, true), 100))
+        .chain([(700, true)]);
+    sizes.enumerate().map(move |(i, (count, moving))| {
         let glass = [0.1, 0.5, 0.9][i % 3];
-        let scene = random_scene(&mut random, count, glass);
+        let scene = random_scene(&mut random, count, glass, moving);
         (format!("scene {i} of {count} spheres"), scene)
     })
 }

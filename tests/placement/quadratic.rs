@@ -7,6 +7,7 @@ use gpu_trace::materials::luminance;
 use gpu_trace::placement::containment::{MOST_CORES, reachable};
 use gpu_trace::placement::media::precedes;
 use gpu_trace::placement::{Media, Medium, Side};
+use gpu_trace::scene::motion::Distances;
 use gpu_trace::scene::{Scene, Sphere};
 
 use super::Answers;
@@ -56,20 +57,24 @@ fn pole_normal(scene: &Scene, centers: &[DVec3], all: &[usize], i: usize) -> Opt
     }
     let eye = scene.camera.position;
     let eye = eye - (scene.spheres[i].center - center);
+    let own = scene.spheres[i].motion;
     let points = || {
         all.iter()
             .copied()
             .filter(small)
-            .map(|j| (centers[j], scene.spheres[j].radius))
-            .chain([(eye, 0.0)])
+            .map(|j| (centers[j], scene.spheres[j].radius, scene.spheres[j].motion))
+            .chain([(eye, 0.0, DVec3::ZERO)])
+            .map(|(point, size, motion)| {
+                let distances = Distances::of(point - center, motion - own);
+                (point, size, distances)
+            })
     };
-    let gap = |point: DVec3| (point.distance(center) - radius).abs();
-    if points().any(|(point, _)| gap(point) > POLE_FAR * radius) {
+    if points().any(|(.., d)| d.farthest_gap(radius) > POLE_FAR * radius) {
         return None;
     }
     let near: Vec<DVec3> = points()
-        .filter(|(point, size)| gap(*point) - size < POLE_NEAR * radius)
-        .map(|(point, _)| point)
+        .filter(|(_, size, d)| d.gap(radius) - size < POLE_NEAR * radius)
+        .map(|(point, ..)| point)
         .collect();
     if near.is_empty() {
         return None;
@@ -80,13 +85,14 @@ fn pole_normal(scene: &Scene, centers: &[DVec3], all: &[usize], i: usize) -> Opt
 
 fn alone(scene: &Scene, i: usize) -> bool {
     let sphere = &scene.spheres[i];
-    let distance = scene.camera.position.distance(sphere.center);
-    (distance - sphere.radius).abs() >= POLE_NEAR * sphere.radius
+    let distances = sphere.distances_from(scene.camera.position);
+    distances.gap(sphere.radius) >= POLE_NEAR * sphere.radius
 }
 
 struct Ball {
     source: usize,
     center: DVec3,
+    motion: DVec3,
     radius: f64,
 }
 
@@ -98,6 +104,7 @@ fn media(scene: &Scene, reachable: &[bool]) -> Media {
         .map(|(source, s)| Ball {
             source,
             center: s.center - scene.camera.position,
+            motion: s.motion,
             radius: s.radius,
         })
         .collect();
@@ -120,7 +127,7 @@ fn media(scene: &Scene, reachable: &[bool]) -> Media {
             media.levels = media.levels.max(level + 1);
             media.example.get_or_insert([ball.source, balls[*j].source]);
         }
-        if ball.center.length() < ball.radius * (1.0 - ROUNDING) {
+        if Distances::of(ball.center, ball.motion).least < ball.radius * (1.0 - ROUNDING) {
             let material = scene.spheres[ball.source].material;
             media.camera.push(Medium {
                 level,
@@ -136,13 +143,18 @@ fn media(scene: &Scene, reachable: &[bool]) -> Media {
 fn neighbours(balls: &[Ball]) -> Vec<Vec<usize>> {
     let mut found = vec![Vec::new(); balls.len()];
     let mut order: Vec<usize> = (0..balls.len()).collect();
-    let left = |i: usize| balls[i].center.x - balls[i].radius;
+    let way = |i: usize| 0.5 * balls[i].motion.x.abs();
+    let left = |i: usize| balls[i].center.x - way(i) - balls[i].radius;
     order.sort_by(|a, b| left(*a).total_cmp(&left(*b)));
     for (at, &i) in order.iter().enumerate() {
         for &j in &order[..at] {
-            let is_open = balls[j].center.x + balls[j].radius >= left(i);
-            let distance = balls[j].center.distance(balls[i].center);
-            if is_open && distance <= balls[j].radius + balls[i].radius {
+            let is_open = balls[j].center.x + way(j) + balls[j].radius >= left(i);
+            let (between, motion) = (
+                balls[j].center - balls[i].center,
+                balls[j].motion - balls[i].motion,
+            );
+            if is_open && Distances::of(between, motion).least <= balls[j].radius + balls[i].radius
+            {
                 found[i].push(j);
                 found[j].push(i);
             }
@@ -155,10 +167,13 @@ fn containers(scene: &Scene, sides: &[Side], reachable: &[bool]) -> Vec<Option<u
     let mut containers = vec![None; scene.spheres.len()];
     let mut order: Vec<usize> = (0..scene.spheres.len()).filter(|i| reachable[*i]).collect();
     let x = |i: usize| scene.spheres[i].center.x;
+    let way =
+        |i: usize, j: usize| 0.5 * (scene.spheres[i].motion.x - scene.spheres[j].motion.x).abs();
     order.sort_by(|a, b| x(*a).total_cmp(&x(*b)));
     for &outer in order.iter().filter(|i| sides[**i] == Side::Tracked) {
         let reach = CLOSE * scene.spheres[outer].radius;
         for &inner in &order {
+            let reach = way(inner, outer) + reach;
             let is_near = x(inner) >= x(outer) - reach && x(inner) <= x(outer) + reach;
             let is_in = inner != outer
                 && sides[inner] != Side::Sign
@@ -181,11 +196,11 @@ fn containers(scene: &Scene, sides: &[Side], reachable: &[bool]) -> Vec<Option<u
 }
 
 fn just_within(outer: &Sphere, inner: &Sphere) -> bool {
-    let distance = outer.center.distance(inner.center);
+    let distances = outer.distances(inner);
     let difference = outer.radius - inner.radius;
     difference > 0.0
-        && difference - distance >= -(ROUNDING * outer.radius)
-        && difference + distance <= CLOSE * outer.radius
+        && difference - distances.most >= -(ROUNDING * outer.radius)
+        && difference + distances.least <= CLOSE * outer.radius
 }
 
 fn is_sealed(scene: &Scene, lamp: usize) -> bool {
@@ -193,16 +208,16 @@ fn is_sealed(scene: &Scene, lamp: usize) -> bool {
     let smooth = |sphere: &Sphere| kind(sphere).is_delta();
     let inner = &scene.spheres[lamp];
     scene.spheres.iter().enumerate().any(|(glass, outer)| {
-        let distance = |other: &Sphere| other.center.distance(outer.center);
+        let distances = |other: &Sphere| other.distances(outer);
         let reaches = |other: &Sphere| {
-            let apart = distance(other) >= outer.radius + other.radius;
-            let around = distance(other) + outer.radius <= other.radius;
+            let apart = distances(other).least >= outer.radius + other.radius;
+            let around = distances(other).most + outer.radius <= other.radius;
             !apart && !around
         };
         glass != lamp
             && kind(outer).transmits()
             && smooth(outer)
-            && distance(inner) + inner.radius <= outer.radius
+            && distances(inner).most + inner.radius <= outer.radius
             && !scene
                 .spheres
                 .iter()

@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use crate::placement::PlacedSphere;
+use crate::reference::scene::ray::anchors_apart;
 
 /// A sphere as a vertex sees it; see the kernel's struct.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,10 +45,16 @@ pub fn aim_pole(x: DVec3, normal: DVec3, curvature: f64) -> Aim {
     }
 }
 
-/// A sphere of the placement, from `anchor + offset`.
+/// A sphere of the placement, from `anchor + time motion + offset`.
 #[must_use]
-pub fn aim_at(sphere: &PlacedSphere, anchor: DVec3, offset: DVec3) -> Aim {
-    let x = (anchor - sphere.anchor) + offset;
+pub fn aim_at(
+    sphere: &PlacedSphere,
+    anchor: DVec3,
+    offset: DVec3,
+    motion: DVec3,
+    time: f64,
+) -> Aim {
+    let x = anchors_apart(sphere, anchor, motion, time) + offset;
     match sphere.pole {
         Some(normal) => aim_pole(x, normal, 1.0 / sphere.radius),
         None => aim_center(x, sphere.radius),

@@ -77,7 +77,13 @@ pub fn sample_light(
     let place = DVec2::new(u[0], u[1]);
     let to = |light: &Light| {
         let target = &placement.spheres[light.sphere];
-        aim_at(target, vertex.anchor, vertex.offset)
+        aim_at(
+            target,
+            vertex.anchor,
+            vertex.offset,
+            vertex.motion,
+            vertex.time,
+        )
     };
     if !lights.from_table(sampling) {
         return weighed_light(lights, vertex, own, u, &to);

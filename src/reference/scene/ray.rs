@@ -11,6 +11,8 @@ use crate::settings::Offset;
 #[expect(missing_docs, reason = "the members are those of the kernel's struct")]
 pub struct Ray {
     pub anchor: DVec3,
+    pub motion: DVec3,
+    pub time: f64,
     pub offset: DVec3,
     pub direction: DVec3,
     pub own: Option<usize>,
@@ -34,15 +36,24 @@ pub struct Hit {
 #[expect(missing_docs, reason = "the members are those of the kernel's struct")]
 pub struct Vertex {
     pub anchor: DVec3,
+    pub motion: DVec3,
+    pub time: f64,
     pub offset: DVec3,
     pub normal: DVec3,
     pub both_sides: bool,
 }
 
+/// The vector from the anchor of `sphere` to another one at `anchor`, that moves by `motion`, at this time.
+#[must_use]
+pub fn anchors_apart(sphere: &PlacedSphere, anchor: DVec3, motion: DVec3, time: f64) -> DVec3 {
+    (anchor - sphere.anchor) + time * (motion - sphere.motion)
+}
+
 /// The point where `ray` hits `sphere`.
 #[must_use]
 pub fn vertex_at(ray: &Ray, hit: &Hit, sphere: &PlacedSphere) -> Vertex {
-    let x = ((ray.anchor - sphere.anchor) + ray.offset) + hit.t * ray.direction;
+    let apart = anchors_apart(sphere, ray.anchor, ray.motion, ray.time);
+    let x = (apart + ray.offset) + hit.t * ray.direction;
     let (offset, outward) = match sphere.pole {
         Some(pole) => (x, (pole + x / sphere.radius).normalize()),
         None => {
@@ -53,6 +64,8 @@ pub fn vertex_at(ray: &Ray, hit: &Hit, sphere: &PlacedSphere) -> Vertex {
     let normal = if hit.inside { -outward } else { outward };
     Vertex {
         anchor: sphere.anchor,
+        motion: sphere.motion,
+        time: ray.time,
         offset,
         normal,
         both_sides: false,
@@ -71,6 +84,8 @@ pub fn leave(
 ) -> Ray {
     let mut ray = Ray {
         anchor: vertex.anchor,
+        motion: vertex.motion,
+        time: arrived.time,
         offset: vertex.offset,
         direction,
         own: Some(hit.index),
@@ -80,7 +95,8 @@ pub fn leave(
     if offset == Offset::Exact {
         return ray;
     }
-    let point = arrived.anchor + (arrived.offset + hit.t * arrived.direction);
+    let start = arrived.anchor + arrived.time * arrived.motion;
+    let point = start + (arrived.offset + hit.t * arrived.direction);
     let out = if crossed {
         -vertex.normal
     } else {
@@ -88,6 +104,7 @@ pub fn leave(
     };
     ray.own = None;
     ray.anchor = DVec3::ZERO;
+    ray.motion = DVec3::ZERO;
     ray.offset = match offset.distances() {
         Some([back, away]) => point - back * arrived.direction + away * out,
         None => ulp_away(point, out),

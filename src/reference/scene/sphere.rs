@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::priority::is_within;
-use super::ray::{Hit, Ray};
+use super::ray::{Hit, Ray, anchors_apart};
 use crate::placement::{PlacedSphere, Side};
 
 /// a t^2 - 2 b t + c = 0 with c = 0 on the surface and positive outside.
@@ -67,7 +67,7 @@ pub fn pole_quadratic(x: DVec3, direction: DVec3, normal: DVec3, curvature: f64)
 pub fn closest_hit(ray: &Ray, spheres: &[PlacedSphere]) -> Option<Hit> {
     let mut nearest: Option<Hit> = None;
     for (index, sphere) in spheres.iter().enumerate() {
-        let x = (ray.anchor - sphere.anchor) + ray.offset;
+        let x = anchors_apart(sphere, ray.anchor, ray.motion, ray.time) + ray.offset;
         let q = match sphere.pole {
             Some(normal) => pole_quadratic(x, ray.direction, normal, 1.0 / sphere.radius),
             None => sphere_quadratic(x, ray.direction, sphere.radius),

@@ -197,6 +197,7 @@ fn scene(cloud: Cloud, view: &View, background: DVec3) -> Scene {
         .iter()
         .map(|ball| Sphere {
             center: ball.center,
+            motion: DVec3::ZERO,
             radius: ball.radius,
             material: ball.color,
             priority: None,
@@ -208,6 +209,7 @@ fn scene(cloud: Cloud, view: &View, background: DVec3) -> Scene {
     let radiance = LAMP_SHARE * (LAMP[0] / LAMP[1]).powi(2);
     spheres.push(Sphere {
         center: center + LAMP[0] * extent * towards,
+        motion: DVec3::ZERO,
         radius: LAMP[1] * extent,
         material: materials.len(),
         priority: None,

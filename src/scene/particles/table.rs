@@ -148,6 +148,7 @@ pub(in crate::scene) fn add(
     materials.extend(colored(cloud.colors, wanted));
     spheres.extend(cloud.balls.into_iter().map(|ball| Sphere {
         center: ball.center,
+        motion: glam::DVec3::ZERO,
         radius: ball.radius,
         material: first + ball.color,
         priority: None,
