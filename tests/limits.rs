@@ -399,9 +399,8 @@ fn few_storage_buffers_are_bound() {
                 if binds_scene { 3 } else { 2 },
                 "{file:?} with {names:?}"
             );
-            let reads = [Effect::Table, Effect::TextureImage];
             let reads_scene =
-                effects.keeps_spheres() || reads.iter().any(|effect| effects.has(*effect));
+                effects.keeps_spheres() || effects.has(Effect::Table) || effects.has_textures();
             assert_eq!(binds_scene, reads_scene, "{file:?} with {names:?}");
             most = most.max(buffers);
         }
