@@ -142,6 +142,7 @@ fn perturbed(scene: &Scene, factor: f64) -> Scene {
             MaterialKind::Sheen(m) => m.color *= factor,
             MaterialKind::Nylon(m) => m.diffuse *= factor,
             MaterialKind::CarPaint(m) => m.diffuse = m.diffuse.map(|kd| factor * kd),
+            MaterialKind::Measured(m) => m.scale *= factor,
         }
     }
     scene

@@ -45,6 +45,7 @@ mod lights;
 mod limits;
 mod material_keys;
 mod materials;
+mod measured;
 mod naive;
 mod output;
 mod particles;

@@ -19,7 +19,7 @@ use std::collections::BTreeSet;
 use std::sync::LazyLock;
 
 use crate::materials::texturable::textured_keys;
-use crate::materials::{Form, flakes, forms};
+use crate::materials::{Form, flakes, forms, measured};
 use crate::placement::{PlacedSphere, Placement};
 use crate::scene::{Material, Scene};
 use crate::settings::Settings;
@@ -409,6 +409,12 @@ impl Effects {
     #[must_use]
     pub fn has_flakes(&self) -> bool {
         self.forms().any(|(_, form)| flakes::are_in(form))
+    }
+
+    /// Whether a material is a table.
+    #[must_use]
+    pub fn has_tables(&self) -> bool {
+        self.forms().any(|(_, form)| measured::is_tabled(form))
     }
 
     /// Whether lights are weighed at each vertex.

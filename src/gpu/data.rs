@@ -11,6 +11,7 @@ use crate::gpu::layout::{
     LightRecord, MaterialRecord, PoleRecord, SKY_TABLE_WIDTH, SphereRecord, anchored_spheres,
     light_weight, sky_table,
 };
+use crate::gpu::measured::{MEASURED_WIDTH, MeasuredTables};
 use crate::gpu::textures::{IMAGE_WIDTH, TextureTable};
 use crate::image::Picture;
 use crate::materials::Member;
@@ -26,6 +27,7 @@ pub(super) const TREE: &str = "tree";
 pub(super) const SKY: &str = "sky";
 pub(super) const SKY_TABLE: &str = "sky_table";
 pub(super) const IMAGES: &str = "image_texels";
+pub(super) const MEASURED: &str = "measured_texels";
 
 /// Whether the device takes the scene's data, and `partials` bytes of partial sums.
 ///
@@ -103,6 +105,28 @@ pub(super) fn check_images(
     Ok(())
 }
 
+/// Whether the device takes the tables of measured materials.
+///
+/// # Errors
+/// [`Error::DeviceLimit`] if they have too many entries together.
+pub(super) fn check_tables(
+    limits: &wgpu::Limits,
+    scene: &Scene,
+    placement: &Placement,
+) -> Result<()> {
+    let (rows, most) = (
+        MeasuredTables::new(scene, placement).rows(),
+        limits.max_texture_dimension_2d,
+    );
+    if rows > most.into() || MEASURED_WIDTH > most {
+        return Err(Error::DeviceLimit(format!(
+            "the tables of measured materials need {MEASURED_WIDTH} x {rows} texels, more than the device's limit of \
+             {most} a side; --backend cpu has no such limit"
+        )));
+    }
+    Ok(())
+}
+
 /// What the device holds of a scene.
 #[derive(Debug)]
 pub(super) struct SceneBytes {
@@ -112,6 +136,7 @@ pub(super) struct SceneBytes {
     sky: Option<(Vec<u8>, u32)>,
     sky_table: Option<Vec<u8>>,
     images: Option<Vec<u8>>,
+    measured: Option<Vec<u8>>,
 }
 
 impl SceneBytes {
@@ -127,8 +152,12 @@ impl SceneBytes {
             Some(bytemuck::cast_slice(&tree.texels).to_vec())
         };
         let textures = TextureTable::new(scene, placement);
+        let tables = MeasuredTables::new(scene, placement);
         Self {
-            data: scene_data(kernel, scene, placement, effects, &textures),
+            data: scene_data(kernel, scene, placement, effects, (&textures, &tables)),
+            measured: effects
+                .has_tables()
+                .then(|| bytemuck::cast_slice(&tables.texels()).to_vec()),
             images: effects
                 .has(Effect::TextureImage)
                 .then(|| bytemuck::cast_slice(&textures.texels()).to_vec()),
@@ -157,6 +186,9 @@ impl SceneBytes {
         }
         if let Some(images) = self.images.as_ref().filter(|_| pass.binds(IMAGES)) {
             recording.upload_texels(IMAGES, images, IMAGE_WIDTH);
+        }
+        if let Some(tables) = self.measured.as_ref().filter(|_| pass.binds(MEASURED)) {
+            recording.upload_texels(MEASURED, tables, MEASURED_WIDTH);
         }
     }
 }
@@ -197,7 +229,7 @@ fn scene_data(
     scene: &Scene,
     placement: &Placement,
     effects: &Effects,
-    textures: &TextureTable,
+    (textures, tables): (&TextureTable, &MeasuredTables),
 ) -> Option<Vec<u8>> {
     let (members, size) = kernel.struct_members("SceneData")?;
     let mut bytes = vec![0; size as usize];
@@ -207,7 +239,7 @@ fn scene_data(
             "spheres" => spheres(placement),
             "poles" => poles(placement),
             "attributes" => attributes(scene, placement, effects),
-            "materials" => materials(kernel, scene, placement, effects, textures),
+            "materials" => materials(kernel, scene, placement, effects, (textures, tables)),
             "patterns" => patterns(kernel, textures),
             "images" => bytemuck::cast_slice(textures.images()).to_vec(),
             "lights" => lights(kernel, placement, effects),
@@ -270,7 +302,7 @@ fn materials(
     scene: &Scene,
     placement: &Placement,
     effects: &Effects,
-    textures: &TextureTable,
+    (textures, tables): (&TextureTable, &MeasuredTables),
 ) -> Vec<u8> {
     let (offsets, size) = kernel.struct_members("Material").unwrap_or_default();
     let members: Vec<(Member, u32)> = std::iter::zip(material_members(effects), offsets)
@@ -279,13 +311,15 @@ fn materials(
     let shared = scene.materials.iter().enumerate();
     let shared = shared.map(|(i, m)| {
         let record = MaterialRecord::new(m, placement.radiance_scale, placement.scale);
+        let record = record.with_table(tables.start(&m.kind));
         record.with_textures(m, textures.of_material(i))
     });
     let anchored = anchored_spheres(scene, placement).map(|i| {
         let sphere = &placement.spheres[i];
         let record = MaterialRecord::of_sphere(sphere, scene, placement);
-        let numbers = textures.of_sphere(i, placement);
-        record.with_textures(&scene.materials[sphere.material], numbers)
+        let material = &scene.materials[sphere.material];
+        let record = record.with_table(tables.start(&material.kind));
+        record.with_textures(material, textures.of_sphere(i, placement))
     });
     let records = shared.chain(anchored);
     records

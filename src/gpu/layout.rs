@@ -11,6 +11,7 @@ use crate::effects::{Effect, Effects};
 use crate::film::{TILE, Tiles};
 use crate::gpu::textures::Numbers;
 use crate::materials::dielectric::Index;
+use crate::materials::measured::START;
 use crate::materials::texturable::{key_values, texture_member};
 use crate::materials::{Member, MemberValue, forms};
 use crate::placement::sky::{Band, Entry};
@@ -374,6 +375,16 @@ impl MaterialRecord {
         let numbers = numbers.iter();
         let members = numbers.map(|(key, n)| (texture_member(key), MemberValue::Word(*n)));
         self.values.extend(members);
+        self
+    }
+
+    /// The same with where its table begins, of a material that has one.
+    #[must_use]
+    pub fn with_table(mut self, start: u32) -> Self {
+        let mut values = self.values.iter_mut();
+        if let Some((_, value)) = values.find(|(member, _)| *member == START) {
+            *value = MemberValue::Word(start);
+        }
         self
     }
 

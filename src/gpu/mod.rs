@@ -6,6 +6,7 @@ mod data;
 pub mod device;
 mod engine;
 pub mod layout;
+pub mod measured;
 mod pace;
 pub mod probe;
 mod region;

@@ -170,6 +170,7 @@ impl Fnv {
                 self.number(pair.y);
             }
             Value::Vectors(vectors) => vectors.into_iter().for_each(|v| self.vector(v)),
+            Value::File { content, .. } => self.bytes(&content.to_le_bytes()),
             // Tables may be left out: their keys say which there are.
             Value::Table(values) => {
                 for (key, value) in values {
@@ -229,6 +230,7 @@ mod tests {
             MaterialKind::Sheen(m) => m.roughness += 0.1,
             MaterialKind::Nylon(m) => m.a.y += 0.1,
             MaterialKind::CarPaint(m) => m.m = None,
+            MaterialKind::Measured(m) => m.scale.x += 0.1,
         };
         let gradient = |zenith| {
             let [horizon, ground] = [DVec3::ZERO; 2];

@@ -12,6 +12,8 @@ mod hash;
 mod image;
 pub mod load;
 pub mod material;
+mod measured;
+mod named;
 pub mod particles;
 mod pieces;
 #[cfg(test)]

@@ -13,7 +13,7 @@ use super::particles;
 use super::report::{Problem, Report, SHOWN};
 use super::suggest::{list, nearest};
 use super::texture_table::{self, Textures};
-use super::{Camera, Handedness, Material, RenderDefaults, Scene, Sphere, environment};
+use super::{Camera, Handedness, Material, RenderDefaults, Scene, Sphere, environment, measured};
 use crate::materials::Mistake;
 
 /// Directions whose angle has a smaller sine are parallel: of the sixteen digits of an f64 the
@@ -181,6 +181,13 @@ pub(super) fn scene(
     texture_table::apply(
         textures,
         &mut materials[..own],
+        place.folder,
+        &mut files,
+        report,
+    );
+    measured::apply(
+        &mut materials[..own],
+        keys,
         place.folder,
         &mut files,
         report,

@@ -21,6 +21,7 @@ use crate::bvh;
 use crate::effects::{Effect, Effects, Role};
 use crate::error::{Error, Result};
 use crate::gpu::layout::{SKY_TABLE_WIDTH, anchored_spheres};
+use crate::gpu::measured::MEASURED_WIDTH;
 use crate::gpu::textures::{IMAGE_WIDTH, TextureTable};
 use crate::materials;
 use crate::placement::{Medium, Placement};
@@ -272,6 +273,9 @@ fn config(scene: &Scene, placement: &Placement, effects: &Effects) -> String {
             table.patterns().len().max(1),
             table.images().len().max(1)
         );
+    }
+    if effects.has_tables() {
+        text += &format!("const MEASURED_WIDTH: u32 = {MEASURED_WIDTH}u;\n");
     }
     text += &environment(scene, placement, effects);
     if effects.has(Effect::Lights) {
