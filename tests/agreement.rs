@@ -143,6 +143,7 @@ fn perturbed(scene: &Scene, factor: f64) -> Scene {
             MaterialKind::Nylon(m) => m.diffuse *= factor,
             MaterialKind::CarPaint(m) => m.diffuse = m.diffuse.map(|kd| factor * kd),
             MaterialKind::Measured(m) => m.scale *= factor,
+            MaterialKind::Mix(m) => m.weight *= factor,
         }
     }
     scene

@@ -26,14 +26,20 @@ impl MeasuredTables {
         let mut all = Self::default();
         let used: BTreeSet<usize> = placement.spheres.iter().map(|s| s.material).collect();
         for index in used {
-            if let Some(table) = scene.materials[index].kind.table()
-                && all.known(table).is_none()
-            {
-                all.tables.push((Arc::clone(table), all.entries));
-                all.entries += table.entries().len() as u64;
+            let kind = &scene.materials[index].kind;
+            let parts = kind.parts().iter().map(|part| &part.material.kind);
+            for table in std::iter::once(kind).chain(parts).filter_map(|kind| kind.table()) {
+                all.add(table);
             }
         }
         all
+    }
+
+    fn add(&mut self, table: &Arc<BrdfTable>) {
+        if self.known(table).is_none() {
+            self.tables.push((Arc::clone(table), self.entries));
+            self.entries += table.entries().len() as u64;
+        }
     }
 
     fn known(&self, table: &Arc<BrdfTable>) -> Option<u64> {

@@ -82,12 +82,18 @@ impl Lobes {
                 event: Event::GLOSSY,
             };
         }
-        let wide = luminance(self.glossy) < luminance(self.diffuse);
         BsdfValue {
             f_cos: self.diffuse + self.glossy,
             pdf: self.pdf,
-            event: if wide { Event::DIFFUSE } else { Event::GLOSSY },
+            event: self.event(),
         }
+    }
+
+    /// What happens: whatever sends the most light.
+    #[must_use]
+    pub fn event(&self) -> Event {
+        let wide = luminance(self.glossy) < luminance(self.diffuse);
+        if wide { Event::DIFFUSE } else { Event::GLOSSY }
     }
 
     /// The answer of `sample`.

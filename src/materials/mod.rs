@@ -32,6 +32,7 @@ use serde::Deserialize;
 
 use dielectric::Index;
 use measured::BrdfTable;
+use mix::Part;
 
 pub use contract::{BsdfSample, BsdfValue, Event, Surface};
 pub use form::{Form, Member, MemberKind, MemberValue};
@@ -97,6 +98,11 @@ pub trait Bsdf {
     /// What was measured, of one that is a table.
     fn table(&self) -> Option<&Arc<BrdfTable>> {
         None
+    }
+
+    /// What it is a mix of.
+    fn parts(&self) -> &[Part] {
+        &[]
     }
 
     /// The same with what does not follow from its parameters, as files' content, from the one that it was made of.
@@ -241,6 +247,7 @@ materials! {
     nylon::Nylon,
     car_paint::CarPaint,
     measured::Measured,
+    mix::Mix,
 }
 
 impl MaterialKind {
@@ -280,9 +287,10 @@ impl MaterialKind {
 pub fn forms() -> &'static [&'static Form] {
     static FORMS: LazyLock<Vec<&'static Form>> = LazyLock::new(|| {
         let mut forms: Vec<&Form> = ALL.iter().flat_map(|material| material.forms).collect();
-        // Rough glass after those that were there before it, and tables after it: so these keep their codes, and kernels
-        // their text.
-        forms.sort_by_key(|form| (measured::is_tabled(form), form.is_translucent()));
+        // Rough glass after those that were there before it, and what came later after it: so these keep their codes, and
+        // kernels their text.
+        let is_later = |form: &Form| measured::is_tabled(form) || mix::is_mix(form);
+        forms.sort_by_key(|form| (is_later(form), form.is_translucent()));
         forms
     });
     &FORMS

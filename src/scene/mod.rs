@@ -13,6 +13,7 @@ mod image;
 pub mod load;
 pub mod material;
 mod measured;
+mod mix;
 mod named;
 pub mod particles;
 mod pieces;

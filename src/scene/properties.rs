@@ -28,7 +28,7 @@ fn value_text(value: Value) -> String {
             let all: Vec<String> = all.into_iter().map(vector).collect();
             format!("[{}]", all.join(", "))
         }
-        Value::File { .. } => unreachable!("random scenes have no files"),
+        Value::File { .. } | Value::Names(_) => unreachable!("random scenes have neither"),
         Value::Table(values) => {
             let pairs = values.into_iter();
             let pairs = pairs.map(|(key, value)| format!("{key} = {}", value_text(value)));
@@ -137,8 +137,8 @@ fn environment() -> impl Strategy<Value = Environment> {
 /// The test cases of all materials; what their numbers may be is the schema's, and damaged elsewhere.
 fn kind() -> impl Strategy<Value = MaterialKind> {
     let mut all: Vec<MaterialKind> = ALL.iter().flat_map(|material| (material.cases)()).collect();
-    // Random scenes have no files.
-    all.retain(|kind| kind.table().is_none());
+    // Random scenes have neither files nor mixes.
+    all.retain(|kind| kind.table().is_none() && kind.parts().is_empty());
     prop::sample::select(all)
 }
 

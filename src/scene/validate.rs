@@ -13,7 +13,7 @@ use super::particles;
 use super::report::{Problem, Report, SHOWN};
 use super::suggest::{list, nearest};
 use super::texture_table::{self, Textures};
-use super::{Camera, Handedness, Material, RenderDefaults, Scene, Sphere, environment, measured};
+use super::{Camera, Handedness, Material, RenderDefaults, Scene, Sphere, environment, measured, mix};
 use crate::materials::Mistake;
 
 /// Directions whose angle has a smaller sine are parallel: of the sixteen digits of an f64 the
@@ -192,6 +192,7 @@ pub(super) fn scene(
         &mut files,
         report,
     );
+    mix::apply(&mut materials[..own], keys, &mut used, report);
     let environment = file.environment.as_ref();
     let environment = environment
         .and_then(|table| environment::of_table(table, place.folder, &mut files, report));
@@ -351,7 +352,7 @@ fn material(name: String, table: MaterialTable) -> Material {
     }
 }
 
-fn unknown_material(name: &str, materials: &[Material]) -> Problem {
+pub(super) fn unknown_material(name: &str, materials: &[Material]) -> Problem {
     let names = || materials.iter().map(|material| material.name.as_str());
     let label =
         nearest(name, names()).map_or_else(String::new, |near| format!("did you mean \"{near}\"?"));
