@@ -86,6 +86,11 @@ impl Walk<'_> {
             let problem = self.wrong(index, message);
             return Err(problem.help("a mix is of materials that are not made of it"));
         }
+        // Each mix on the way has another material at least.
+        let too_many = || format!("the mix \"{shown}\" is of more than {MOST_PARTS} materials");
+        if self.way.len() == MOST_PARTS {
+            return Err(self.wrong(index, too_many()));
+        }
         self.way.push(index);
         let mut parts = Vec::new();
         for (name, second) in mix.materials.iter().zip([false, true]) {
@@ -99,8 +104,7 @@ impl Walk<'_> {
             self.met.insert(found);
             parts.extend(self.half(index, found, second)?);
             if parts.len() > MOST_PARTS {
-                let message = format!("the mix \"{shown}\" is of more than {MOST_PARTS} materials");
-                return Err(self.wrong(index, message));
+                return Err(self.wrong(index, too_many()));
             }
         }
         self.way.pop();
