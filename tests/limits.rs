@@ -400,8 +400,9 @@ fn few_storage_buffers_are_bound() {
                 "{file:?} with {names:?}"
             );
             let reads = [Effect::Table, Effect::TextureImage];
-            let reads_scene =
-                effects.keeps_spheres() || reads.iter().any(|effect| effects.has(*effect));
+            let reads_scene = effects.keeps_spheres()
+                || effects.has_mixes()
+                || reads.iter().any(|effect| effects.has(*effect));
             assert_eq!(binds_scene, reads_scene, "{file:?} with {names:?}");
             most = most.max(buffers);
         }

@@ -46,6 +46,7 @@ mod limits;
 mod material_keys;
 mod materials;
 mod measured;
+mod mix;
 mod naive;
 mod output;
 mod particles;

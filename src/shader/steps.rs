@@ -128,7 +128,9 @@ pub const LOOPS: [Loop; 17] = [
     // what they say of one, to a light or drawn uniformly,
     Loop {
         function: "evaluate_mix",
-        used: Effects::has_mixes,
+        used: |effects| {
+            effects.has_mixes() && (effects.samples_light() || effects.has(Effect::Lecture))
+        },
         at_vertex: |placement, effects| {
             let lecture = usize::from(effects.has(Effect::Lecture));
             (lecture + rays(effects) - 1) * (placement.mixed[0].max(1) + 1)
