@@ -176,7 +176,10 @@ fn a_table_of_nylon_is_nylon() {
     assert!(at(&errors(&table, &other), 0.5) > 1.0e-3);
     // And its light, at most 0.39 at 85 degrees, is nylon's.
     let [own, nylons] = [table.albedo(), Nylon::default().albedo()];
-    assert!(((own - nylons) / nylons).abs().max_element() < 0.05, "{own} for {nylons}");
+    assert!(
+        ((own - nylons) / nylons).abs().max_element() < 0.05,
+        "{own} for {nylons}"
+    );
 }
 
 #[test]
@@ -211,7 +214,11 @@ fn metal() -> Conductor {
         "type = \"conductor\"\npreset = \"copper\"",
     );
     let loaded = load_str_in("scene", &text, Path::new("")).expect("good");
-    let white = loaded.scene.materials.into_iter().find(|m| m.name == "white");
+    let white = loaded
+        .scene
+        .materials
+        .into_iter()
+        .find(|m| m.name == "white");
     match white.expect("it is there").kind {
         MaterialKind::Conductor(metal) => metal,
         other => panic!("{other:?}"),
@@ -224,7 +231,11 @@ fn spread(material: &dyn Bsdf, degrees: f64) -> f64 {
     let (sin, cos) = degrees.to_radians().sin_cos();
     let wo = DVec3::new(sin, 0.0, cos);
     let weights: Vec<DVec3> = (0..50_000)
-        .map(|_| material.sample(&flat(), wo, random.unit4().map(f64::from)).weight)
+        .map(|_| {
+            material
+                .sample(&flat(), wo, random.unit4().map(f64::from))
+                .weight
+        })
         .collect();
     let of = |channel: usize| {
         let all: Vec<f64> = weights.iter().map(|w| w[channel]).collect();
@@ -261,7 +272,10 @@ fn what_is_fitted_leaves_little() {
         let found = [20.0, 45.0, 70.0].map(|degrees| spread(&table, degrees));
         let alpha = table.table.as_ref().map(|table| table.lobe().alpha);
         eprintln!("roughness {roughness}: {found:.3?}, alpha {alpha:?}");
-        assert!(found[1] <= 0.3 && found.iter().all(|x| *x <= 0.6), "{roughness}: {found:?}");
+        assert!(
+            found[1] <= 0.3 && found.iter().all(|x| *x <= 0.6),
+            "{roughness}: {found:?}"
+        );
     }
     let found = spread(&measured(&NYLON), 45.0);
     eprintln!("nylon: {found:.3}");
@@ -331,19 +345,31 @@ fn what_is_no_table_is_refused() {
             assert!(error.contains(part), "{part:?} is not in {error}");
         }
     };
-    refused("file = \"none.binary\"", 14, &["cannot read", "none.binary"]);
+    refused(
+        "file = \"none.binary\"",
+        14,
+        &["cannot read", "none.binary"],
+    );
     refused("file = \".\"", 14, &["is no regular file"]);
     refused("scale = 2", 12, &["`file` is missing"]);
     refused("file = 3", 14, &["`file` must be a string"]);
     refused("file = \"a\"\nscale = -1", 15, &["`scale`", "negative"]);
-    refused("file = \"a\"\nscale = [1, nan, 1]", 15, &["`scale`", "finite"]);
+    refused(
+        "file = \"a\"\nscale = [1, nan, 1]",
+        15,
+        &["`scale`", "finite"],
+    );
     refused("file = \"a\"\naxes = 1", 15, &["unknown key `axes`"]);
     let write = |bytes: &[u8]| folder.write("a.binary", bytes);
     let named = "file = \"a.binary\"";
     write(&NYLON[..7]);
     refused(named, 14, &["a.binary: it has 7 bytes", "truncated"]);
     write(&NYLON[..NYLON.len() - 8]);
-    refused(named, 14, &["it has 34992004 bytes, and a MERL file 34992012: it is truncated"]);
+    refused(
+        named,
+        14,
+        &["it has 34992004 bytes, and a MERL file 34992012: it is truncated"],
+    );
     let mut bytes = NYLON.clone();
     bytes.push(0);
     write(&bytes);
@@ -362,7 +388,14 @@ fn what_is_no_table_is_refused() {
         let mut bytes = NYLON.clone();
         bytes[12 + 8 * at..][..8].copy_from_slice(&value.to_le_bytes());
         write(&bytes);
-        refused(named, 14, &["its green value 3, 4, 5 (by theta_h, theta_d, phi_d)", shown]);
+        refused(
+            named,
+            14,
+            &[
+                "its green value 3, 4, 5 (by theta_h, theta_d, phi_d)",
+                shown,
+            ],
+        );
     }
 }
 
@@ -371,7 +404,10 @@ fn wrong_scenes_exit_with_2_and_tables_go_with_film_files() {
     let folder = Folder::new();
     folder.write("bad.toml", scene_of("file = \"none.binary\""));
     let says = folder.refused(&["scene", "check", "bad.toml"]);
-    assert!(says.contains("bad.toml:14:") && says.contains("none.binary"), "{says}");
+    assert!(
+        says.contains("bad.toml:14:") && says.contains("none.binary"),
+        "{says}"
+    );
     #[cfg(unix)]
     {
         folder.write("device.toml", scene_of("file = \"/dev/zero\""));

@@ -88,7 +88,10 @@ fn tables(text: &mut String, scene: &Scene) -> fmt::Result {
     for (name, measured) in all.iter().take(TABLES_LISTED) {
         let file = measured.file.escape_debug();
         let most = significant(measured.albedo().max_element());
-        writeln!(text, "  {name}: {file}, which scatters at most {most} of the light")?;
+        writeln!(
+            text,
+            "  {name}: {file}, which scatters at most {most} of the light"
+        )?;
     }
     if all.len() > TABLES_LISTED {
         writeln!(text, "  and {} more", all.len() - TABLES_LISTED)?;

@@ -106,9 +106,9 @@ impl Incidence {
             .collect();
         // It is convex in the share.
         let rises = |share: f64| {
-            let slopes = densities.iter().map(|[square, cosine, more]| {
-                -square * more / (cosine + share * more).powi(2)
-            });
+            let slopes = densities
+                .iter()
+                .map(|[square, cosine, more]| -square * more / (cosine + share * more).powi(2));
             slopes.sum::<f64>() > 0.0
         };
         let (mut low, mut high) = (0.0, MOST);

@@ -47,7 +47,7 @@ impl BrdfTable {
     /// If there are more or fewer entries than the sizes say, or none.
     #[must_use]
     pub fn new(sizes: [usize; 3], entries: Vec<[f32; 3]>) -> Self {
-        assert!(!entries.is_empty() && entries.len() == sizes.iter().product());
+        assert!(!entries.is_empty() && entries.len() == sizes.iter().product::<usize>());
         let mut hasher = FnvHasher::default();
         for size in sizes {
             hasher.write(&(size as u64).to_le_bytes());
