@@ -83,7 +83,11 @@ fn apart(a: &Film, b: &Film) -> f64 {
     });
     let values: Vec<(f64, f64)> = values.collect();
     let largest = values.iter().map(|(_, b)| *b).fold(0.0, f64::max);
-    values.iter().map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / largest
+    values
+        .iter()
+        .map(|(a, b)| (a - b).abs())
+        .fold(0.0, f64::max)
+        / largest
 }
 
 fn image(scene: &Scene) -> Film {
@@ -96,9 +100,8 @@ fn colours_are_mixed() {
     let diffuse = |albedo: &str| format!("type = \"diffuse\"\nalbedo = {albedo}");
     let plain = diffuse("[0.625, 0.21875, 0.3125]");
     let checker = diffuse("{ checker = [[0.75, 0.25, 0.125], [0.25, 0.125, 0.875]], size = 0.3 }");
-    let noise = diffuse(
-        "{ noise = [[0.75, 0.25, 0.125], [0.25, 0.125, 0.875]], size = 0.4, octaves = 3 }",
-    );
+    let noise =
+        diffuse("{ noise = [[0.75, 0.25, 0.125], [0.25, 0.125, 0.875]], size = 0.4, octaves = 3 }");
     for (weight, colour) in [
         ("0.25", &plain),
         ("{ checker = [0, 1], size = 0.3 }", &checker),
@@ -175,17 +178,31 @@ fn light_is_mixed_whatever_draws_it() {
         ] {
             let (mean, error) = light(&ball(&mix_of(a, b, "0.375")), integrator);
             let z = |(wanted, own): (f64, f64)| (mean - wanted).abs() / error.hypot(own);
-            eprintln!("{a}, {b}, {integrator:?}: {mean} +- {error}, {right:?}, z {}", z(right));
+            eprintln!(
+                "{a}, {b}, {integrator:?}: {mean} +- {error}, {right:?}, z {}",
+                z(right)
+            );
             assert!(z(right) < limit, "{a}, {b}, {integrator:?}");
             // Companion, where so few samples tell anything.
-            assert!(integrator != Integrator::Path || z(wrong) > limit, "{a}, {b}");
+            assert!(
+                integrator != Integrator::Path || z(wrong) > limit,
+                "{a}, {b}"
+            );
         }
     }
 }
 
 #[test]
 fn two_mirrors_are_one_of_both() {
-    let mirror = |reflectance: [f64; 3]| Material::new("mirror", Mirror { reflectance: reflectance.into() }.into());
+    let mirror = |reflectance: [f64; 3]| {
+        Material::new(
+            "mirror",
+            Mirror {
+                reflectance: reflectance.into(),
+            }
+            .into(),
+        )
+    };
     let part = |material, second| Part {
         material,
         second,
@@ -223,7 +240,11 @@ fn two_mirrors_are_one_of_both() {
 fn mixes_of_mixes_are_flat() {
     let inner = "[material.inner]\ntype = \"mix\"\nmaterials = [\"blue\", \"cloth\"]\nweight = { checker = [0.5, 0.125], size = 10.0 }\n";
     let scene = scene(&format!("{}{inner}", text(&mix_of("red", "inner", "0.25"))));
-    let own = scene.materials.iter().find(|m| m.name == "ball").expect("a ball");
+    let own = scene
+        .materials
+        .iter()
+        .find(|m| m.name == "ball")
+        .expect("a ball");
     assert_eq!(own.kind.parts().len(), 3);
     // In the first cell.
     let point = TexturePoint {
@@ -246,7 +267,12 @@ fn mixes_of_mixes_are_flat() {
         part.expect("a part").kind.evaluate(&surface, wo, wi).f_cos
     };
     let wanted = 0.75 * of("red") + 0.125 * of("blue") + 0.125 * of("cloth");
-    assert!((mix.evaluate(&surface, wo, wi).f_cos - wanted).abs().max_element() < 1.0e-15);
+    assert!(
+        (mix.evaluate(&surface, wo, wi).f_cos - wanted)
+            .abs()
+            .max_element()
+            < 1.0e-15
+    );
     // What is used by mixes is used; what can be is no more than all.
     let most = DVec3::new(0.8, 0.3, 0.9);
     assert!(own.albedo().cmple(most).all());
@@ -265,10 +291,17 @@ fn only_the_mix_emits() {
         image(&scene).mean(12 * 24 + 12)
     };
     assert_eq!(film(&dark), [0.0; 3]);
-    assert_eq!(film(&format!("{dark}emission = [2, 1, 4]\n")), [2.0, 1.0, 4.0]);
+    assert_eq!(
+        film(&format!("{dark}emission = [2, 1, 4]\n")),
+        [2.0, 1.0, 4.0]
+    );
     // And its colour is the mean of theirs.
     let scene = ball(&mix_of("red", "blue", "0.25"));
-    let own = scene.materials.iter().find(|m| m.name == "ball").expect("a ball");
+    let own = scene
+        .materials
+        .iter()
+        .find(|m| m.name == "ball")
+        .expect("a ball");
     assert_eq!(own.kind.color(), DVec3::new(0.625, 0.21875, 0.3125));
 }
 
@@ -281,10 +314,22 @@ fn the_kernel_has_what_the_parts_ask_for() {
         names.join(" ")
     };
     let mixed = names(&mix_of("coated", "cloth", "{ noise = [0, 1] }"));
-    for name in ["mix", "car_paint_coated", "sheen", "texture_noise", "textured_weight"] {
-        assert!(mixed.split(' ').any(|own| own == name), "{name} is not in {mixed}");
+    for name in [
+        "mix",
+        "car_paint_coated",
+        "sheen",
+        "texture_noise",
+        "textured_weight",
+    ] {
+        assert!(
+            mixed.split(' ').any(|own| own == name),
+            "{name} is not in {mixed}"
+        );
     }
-    assert!(!mixed.contains("conductor") && !mixed.contains("mirror"), "{mixed}");
+    assert!(
+        !mixed.contains("conductor") && !mixed.contains("mirror"),
+        "{mixed}"
+    );
     let scene = ball(&mix_of("red", "blue", "0.5"));
     assert_eq!(Placement::new(&scene, 24, 24).mixed, [2, 0]);
 }
@@ -313,7 +358,11 @@ fn what_is_no_mix_is_refused() {
         names,
         &["unknown material \"blu\"", "did you mean \"blue\"?"],
     );
-    refused(&mix_of("red", "ball", "0.5"), names, &["\"ball\" is a mix of itself"]);
+    refused(
+        &mix_of("red", "ball", "0.5"),
+        names,
+        &["\"ball\" is a mix of itself"],
+    );
     refused(
         &format!(
             "{}\n[material.other]\n{}",
@@ -338,7 +387,11 @@ fn what_is_no_mix_is_refused() {
         names,
         &["must be a string"],
     );
-    refused(&mix_of("red", "blue", "1.5"), "weight = 1.5", &["`weight`", "[0, 1]"]);
+    refused(
+        &mix_of("red", "blue", "1.5"),
+        "weight = 1.5",
+        &["`weight`", "[0, 1]"],
+    );
     refused(
         &mix_of("red", "blue", "{ checker = [0, 2] }"),
         "weight = {",
@@ -352,7 +405,10 @@ fn what_is_no_mix_is_refused() {
     // A chain of mixes, of more materials than one may be of.
     let chain = |links: usize| {
         let link = |i: usize| {
-            format!("[material.m{i}]\n{}\n", mix_of("red", &format!("m{}", i + 1), "0.5"))
+            format!(
+                "[material.m{i}]\n{}\n",
+                mix_of("red", &format!("m{}", i + 1), "0.5")
+            )
         };
         let links: String = (0..links).map(link).collect();
         format!(
@@ -363,7 +419,9 @@ fn what_is_no_mix_is_refused() {
     };
     load_str("scene", &text(&chain(62))).unwrap_or_else(|e| panic!("{e}"));
     for links in [63, 10_000] {
-        let error = load_str("scene", &text(&chain(links))).expect_err("too many").to_string();
+        let error = load_str("scene", &text(&chain(links)))
+            .expect_err("too many")
+            .to_string();
         assert!(error.contains("is of more than 64 materials"), "{error}");
     }
 }
@@ -372,11 +430,16 @@ fn what_is_no_mix_is_refused() {
 fn the_hash_is_of_the_parts() {
     let hash = |lines: &str, names: &dyn Fn(String) -> String| {
         let text = names(text(lines));
-        load_str("scene", &text).unwrap_or_else(|e| panic!("{e}")).hash
+        load_str("scene", &text)
+            .unwrap_or_else(|e| panic!("{e}"))
+            .hash
     };
     let same = |text: String| text;
     let plain = hash(&mix_of("red", "blue", "0.25"), &same);
-    let renamed = |text: String| text.replace("\"red\"", "\"rosy\"").replace("material.red", "material.rosy");
+    let renamed = |text: String| {
+        text.replace("\"red\"", "\"rosy\"")
+            .replace("material.red", "material.rosy")
+    };
     assert_eq!(plain, hash(&mix_of("red", "blue", "0.25"), &renamed));
     let recoloured = |text: String| text.replace("albedo = [0.75,", "albedo = [0.7,");
     let others = [

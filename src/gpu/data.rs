@@ -8,8 +8,8 @@ use crate::effects::{Effect, Effects};
 use crate::error::{Error, Result};
 use crate::gpu::engine::{Pass, Recording};
 use crate::gpu::layout::{
-    LightRecord, PoleRecord, SKY_TABLE_WIDTH, SphereRecord, anchored_spheres,
-    light_weight, sky_table,
+    LightRecord, PoleRecord, SKY_TABLE_WIDTH, SphereRecord, anchored_spheres, light_weight,
+    sky_table,
 };
 use crate::gpu::measured::{MEASURED_WIDTH, MeasuredTables};
 use crate::gpu::tables::SceneTables;

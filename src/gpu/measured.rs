@@ -28,7 +28,10 @@ impl MeasuredTables {
         for index in used {
             let kind = &scene.materials[index].kind;
             let parts = kind.parts().iter().map(|part| &part.material.kind);
-            for table in std::iter::once(kind).chain(parts).filter_map(|kind| kind.table()) {
+            for table in std::iter::once(kind)
+                .chain(parts)
+                .filter_map(|kind| kind.table())
+            {
                 all.add(table);
             }
         }

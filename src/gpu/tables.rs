@@ -36,7 +36,12 @@ impl SceneTables {
 
     /// The record of a material of the scene, for spheres about their centres.
     #[must_use]
-    pub fn of_material(&self, index: usize, scene: &Scene, placement: &Placement) -> MaterialRecord {
+    pub fn of_material(
+        &self,
+        index: usize,
+        scene: &Scene,
+        placement: &Placement,
+    ) -> MaterialRecord {
         let material = &scene.materials[index];
         let record = MaterialRecord::new(material, placement.radiance_scale, placement.scale);
         let numbers = self.textures.of_material(index);
@@ -50,7 +55,12 @@ impl SceneTables {
         let material = &scene.materials[sphere.material];
         let record = MaterialRecord::of_sphere(material, sphere, placement);
         let numbers = self.textures.of_sphere(index, placement);
-        self.complete(record, material, numbers, self.mixes.of_sphere(index, placement))
+        self.complete(
+            record,
+            material,
+            numbers,
+            self.mixes.of_sphere(index, placement),
+        )
     }
 
     fn complete(

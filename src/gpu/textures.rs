@@ -234,11 +234,7 @@ impl TextureTable {
         &self.all_of_sphere(index, placement).1
     }
 
-    fn all_of_sphere(
-        &self,
-        index: usize,
-        placement: &Placement,
-    ) -> &(Numbers, Vec<PartNumbers>) {
+    fn all_of_sphere(&self, index: usize, placement: &Placement) -> &(Numbers, Vec<PartNumbers>) {
         let own = self.of_spheres.get(&index);
         own.unwrap_or(&self.of_materials[placement.spheres[index].material])
     }

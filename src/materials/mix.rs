@@ -205,7 +205,11 @@ impl Mix {
         let parts = self.parts.iter();
         parts
             .map(|part| {
-                let own = if part.second { self.weight } else { 1.0 - self.weight };
+                let own = if part.second {
+                    self.weight
+                } else {
+                    1.0 - self.weight
+                };
                 own * part.inner.iter().map(Factor::share).product::<f64>()
             })
             .collect()
@@ -222,7 +226,11 @@ impl Mix {
             .parts
             .iter()
             .map(|part| {
-                let own = if part.second { self.weight } else { 1.0 - self.weight };
+                let own = if part.second {
+                    self.weight
+                } else {
+                    1.0 - self.weight
+                };
                 let inner = part.inner.iter().map(Factor::range);
                 let range = inner.fold([own; 2], |[a, b], [c, d]| [a * c, b * d]);
                 (range, value(&part.material))

@@ -179,7 +179,9 @@ fn each(scene: &mut Scene, mut change: impl FnMut(&mut Material)) {
     for material in &mut scene.materials {
         change(material);
         if let MaterialKind::Mix(mix) = &mut material.kind {
-            mix.parts.iter_mut().for_each(|part| change(&mut part.material));
+            mix.parts
+                .iter_mut()
+                .for_each(|part| change(&mut part.material));
         }
     }
 }

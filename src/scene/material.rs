@@ -102,7 +102,9 @@ impl Material {
         let own = self.kind.form();
         let smooth = self.smooth_form();
         let parts = self.kind.parts().iter();
-        let parts: Vec<&Form> = parts.flat_map(|part| part.material.forms().collect::<Vec<_>>()).collect();
+        let parts: Vec<&Form> = parts
+            .flat_map(|part| part.material.forms().collect::<Vec<_>>())
+            .collect();
         let own = std::iter::once(own).chain(smooth.filter(move |smooth| *smooth != own));
         own.chain(parts)
     }

@@ -13,7 +13,9 @@ use super::particles;
 use super::report::{Problem, Report, SHOWN};
 use super::suggest::{list, nearest};
 use super::texture_table::{self, Textures};
-use super::{Camera, Handedness, Material, RenderDefaults, Scene, Sphere, environment, measured, mix};
+use super::{
+    Camera, Handedness, Material, RenderDefaults, Scene, Sphere, environment, measured, mix,
+};
 use crate::materials::Mistake;
 
 /// Directions whose angle has a smaller sine are parallel: of the sixteen digits of an f64 the

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::textures;
+use super::{mixes, textures};
 use crate::effects::{Effect, Effects};
 use crate::materials::{Form, Member, MemberKind, mix};
 

@@ -8,7 +8,9 @@ use crate::materials::{Form, mix};
 /// What the functions import; `deltas`: whether a part has delta lobes.
 pub(super) fn imports(form: &Form, lecture: bool, deltas: bool) -> String {
     let name = form.name;
-    let mut all = ["evaluate", "sample"].map(|what| format!("{what}_{name}")).to_vec();
+    let mut all = ["evaluate", "sample"]
+        .map(|what| format!("{what}_{name}"))
+        .to_vec();
     all.push("NO_PART".into());
     if !lecture || deltas {
         all.extend(["choose_part", "part_material"].map(str::to_owned));

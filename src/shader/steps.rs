@@ -154,9 +154,7 @@ pub const LOOPS: [Loop; 17] = [
     Loop {
         function: "part_weight",
         used: |effects| effects.textured_keys().any(|key| key == WEIGHT),
-        at_vertex: |placement, effects| {
-            visits(effects) * (placement.mixed[0] + placement.mixed[1])
-        },
+        at_vertex: |placement, effects| visits(effects) * (placement.mixed[0] + placement.mixed[1]),
     },
     // Over the lights that are weighed.
     Loop {

@@ -6,8 +6,8 @@ use std::f64::consts::TAU;
 use glam::{DVec2, DVec3};
 
 use crate::materials::MaterialKind;
-use crate::materials::mix::Weight;
 use crate::materials::lattice::LatticePoint;
+use crate::materials::mix::Weight;
 use crate::materials::texturable::EMISSION;
 use crate::reference::core::random::mix_bits;
 use crate::scene::Material;
