@@ -1,6 +1,6 @@
 //! Mixes of materials: what their parts are.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashMap};
 use std::ops::Range;
 
 use glam::DVec3;
@@ -24,10 +24,13 @@ pub(super) fn apply(
     let mixes: Vec<usize> = (0..materials.len())
         .filter(|i| is_mix(&materials[*i]))
         .collect();
+    let names = (0..).zip(materials.iter());
+    let names: HashMap<&str, usize> = names.map(|(i, m)| (m.name.as_str(), i)).collect();
     let mut all = Vec::new();
     for index in mixes {
         let mut walk = Walk {
             materials,
+            names: &names,
             keys,
             way: Vec::new(),
             met: BTreeSet::new(),
@@ -50,6 +53,7 @@ pub(super) fn apply(
 /// Through mixes of mixes.
 struct Walk<'a> {
     materials: &'a [Material],
+    names: &'a HashMap<&'a str, usize>,
     keys: &'a MaterialKeys,
     /// From the first mix to this one.
     way: Vec<usize>,
@@ -94,7 +98,7 @@ impl Walk<'_> {
         self.way.push(index);
         let mut parts = Vec::new();
         for (name, second) in mix.materials.iter().zip([false, true]) {
-            let Some(found) = self.materials.iter().position(|m| m.name == *name) else {
+            let Some(&found) = self.names.get(name.as_str()) else {
                 let problem = unknown_material(name, self.materials);
                 return Err(Problem {
                     span: self.place(index),

@@ -37,7 +37,11 @@ pub fn members(effects: &Effects) -> Vec<Member> {
             }
         }
     }
-    own.extend(textures::members(effects));
+    for member in textures::members(effects) {
+        if !own.contains(&member) {
+            own.push(member);
+        }
+    }
     let (vectors, scalars): (Vec<Member>, Vec<Member>) =
         own.into_iter().partition(|m| m.kind == MemberKind::Vector);
     let mut members = vec![Member::vector("color"), Member::word("kind")];
