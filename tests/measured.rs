@@ -174,12 +174,11 @@ fn a_table_of_nylon_is_nylon() {
         ..Nylon::default()
     };
     assert!(at(&errors(&table, &other), 0.5) > 1.0e-3);
-    // And its light, at most 0.39 at 85 degrees, is nylon's.
-    let [own, nylons] = [table.albedo(), Nylon::default().albedo()];
-    assert!(
-        ((own - nylons) / nylons).abs().max_element() < 0.05,
-        "{own} for {nylons}"
-    );
+    // And so is its light, but for grazing angles, where entries next to those below the horizon are darker.
+    let [own, nylons] = [&table as &dyn Bsdf, &Nylon::default()].map(|m| weights(m, 45.0).0);
+    let off = ((own - nylons) / nylons).abs().max_element();
+    assert!(off < 0.01, "{own} for {nylons}");
+    assert!((own / 1.03 - nylons).abs().max_element() > 0.01 * nylons.max_element());
 }
 
 #[test]
@@ -225,24 +224,31 @@ fn metal() -> Conductor {
     }
 }
 
-/// Variance over squared mean of a sample's weight at an angle, the largest of all channels.
-fn spread(material: &dyn Bsdf, degrees: f64) -> f64 {
-    let mut random = Random::new("spread");
+/// The mean of samples' weights at an angle, and their variance over its square, the largest of all channels.
+fn weights(material: &dyn Bsdf, degrees: f64) -> (DVec3, f64) {
+    let mut random = Random::new("weights");
     let (sin, cos) = degrees.to_radians().sin_cos();
     let wo = DVec3::new(sin, 0.0, cos);
     let weights: Vec<DVec3> = (0..50_000)
         .map(|_| {
-            material
-                .sample(&flat(), wo, random.unit4().map(f64::from))
-                .weight
+            let u = random.unit4().map(f64::from);
+            material.sample(&flat(), wo, u).weight
         })
         .collect();
-    let of = |channel: usize| {
+    let of = [0, 1, 2].map(|channel| {
         let all: Vec<f64> = weights.iter().map(|w| w[channel]).collect();
         let (mean, error) = mean_and_error(&all);
-        (error / mean).powi(2) * all.len() as f64
-    };
-    (0..3).map(of).fold(0.0, f64::max)
+        (mean, (error / mean).powi(2) * all.len() as f64)
+    });
+    let means = of.map(|(mean, _)| mean);
+    (
+        means.into(),
+        of.into_iter().map(|(_, x)| x).fold(0.0, f64::max),
+    )
+}
+
+fn spread(material: &dyn Bsdf, degrees: f64) -> f64 {
+    weights(material, degrees).1
 }
 
 /// The same of directions by the cosine alone.
@@ -282,7 +288,7 @@ fn what_is_fitted_leaves_little() {
     assert!(found <= 0.3, "{found}");
     // Where there is no lobe, the cosine alone leaves nothing; of a narrow one, nearly everything.
     let dull = BrdfTable::sampled([2, 2, 2], |_, _| DVec3::splat(0.1));
-    assert_eq!(dull.lobe().lobe, [0.0; 6]);
+    assert!(dull.lobe().lobe.iter().all(|share| *share < 1.0e-4));
     let narrow = measured(&file_of(&Conductor {
         roughness: 0.15,
         ..metal()
@@ -331,7 +337,7 @@ fn files_are_read_once_and_count_by_their_content() {
     // What gains light is said to.
     assert!(loaded.warnings.is_empty(), "{:?}", loaded.warnings);
     let bright = load(&folder, "file = \"a.binary\"\nscale = 5").expect("good");
-    let says = "gains energy: at some angles it scatters 1.9";
+    let says = "gains energy: at some angles it scatters 2.2";
     assert!(bright.warnings[0].contains(says), "{:?}", bright.warnings);
 }
 
