@@ -37,7 +37,7 @@ pub(super) fn apply(
         };
         match walk.parts(index) {
             Ok(parts) => all.push((index, parts)),
-            Err(problem) => report.errors.push(problem),
+            Err(problem) => report.errors.push(*problem),
         }
         if used.contains(&index) {
             used.extend(walk.met);
@@ -72,7 +72,7 @@ impl Walk<'_> {
         Problem::new(self.place(index), message, "")
     }
 
-    fn parts(&mut self, index: usize) -> Result<Vec<Part>, Problem> {
+    fn parts(&mut self, index: usize) -> Result<Vec<Part>, Box<Problem>> {
         let material = &self.materials[index];
         let MaterialKind::Mix(mix) = &material.kind else {
             return Ok(Vec::new());
@@ -88,27 +88,27 @@ impl Walk<'_> {
                 names.join(", of ")
             );
             let problem = self.wrong(index, message);
-            return Err(problem.help("a mix is of materials that are not made of it"));
+            return Err(problem
+                .help("a mix is of materials that are not made of it")
+                .into());
         }
         // Each mix on the way has another material at least.
         let too_many = || format!("the mix \"{shown}\" is of more than {MOST_PARTS} materials");
         if self.way.len() == MOST_PARTS {
-            return Err(self.wrong(index, too_many()));
+            return Err(self.wrong(index, too_many()).into());
         }
         self.way.push(index);
         let mut parts = Vec::new();
         for (name, second) in mix.materials.iter().zip([false, true]) {
             let Some(&found) = self.names.get(name.as_str()) else {
                 let problem = unknown_material(name, self.materials);
-                return Err(Problem {
-                    span: self.place(index),
-                    ..problem
-                });
+                let span = self.place(index);
+                return Err(Problem { span, ..problem }.into());
             };
             self.met.insert(found);
             parts.extend(self.half(index, found, second)?);
             if parts.len() > MOST_PARTS {
-                return Err(self.wrong(index, too_many()));
+                return Err(self.wrong(index, too_many()).into());
             }
         }
         self.way.pop();
@@ -116,7 +116,12 @@ impl Walk<'_> {
     }
 
     /// The parts that one of the two materials of the mix `index` is.
-    fn half(&mut self, index: usize, found: usize, second: bool) -> Result<Vec<Part>, Problem> {
+    fn half(
+        &mut self,
+        index: usize,
+        found: usize,
+        second: bool,
+    ) -> Result<Vec<Part>, Box<Problem>> {
         let own = &self.materials[found];
         if own.kind.transmits() {
             let message = format!(
@@ -124,7 +129,9 @@ impl Walk<'_> {
                 own.name.escape_debug()
             );
             let problem = self.wrong(index, message);
-            return Err(problem.help("a mix is of materials that no light goes through"));
+            return Err(problem
+                .help("a mix is of materials that no light goes through")
+                .into());
         }
         let MaterialKind::Mix(inner) = &own.kind else {
             let mut material = own.clone();
