@@ -142,6 +142,8 @@ fn perturbed(scene: &Scene, factor: f64) -> Scene {
             MaterialKind::Sheen(m) => m.color *= factor,
             MaterialKind::Nylon(m) => m.diffuse *= factor,
             MaterialKind::CarPaint(m) => m.diffuse = m.diffuse.map(|kd| factor * kd),
+            MaterialKind::Measured(m) => m.scale *= factor,
+            MaterialKind::Mix(m) => m.weight *= factor,
         }
     }
     scene

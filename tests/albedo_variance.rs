@@ -15,7 +15,14 @@ use gpu_trace::verify::Random;
 use gpu_trace::verify::bsdf::draw::OFFSETS;
 
 /// Those whose sampling is no closed matter.
-const MATERIALS: &[&str] = &["ashikhmin", "disney", "sheen", "nylon", "car-paint"];
+const MATERIALS: &[&str] = &[
+    "ashikhmin",
+    "disney",
+    "sheen",
+    "nylon",
+    "car-paint",
+    "measured",
+];
 const BAR: f64 = 0.3;
 /// For the channels.
 fn channels_bar(name: &str) -> f64 {

@@ -399,8 +399,10 @@ fn few_storage_buffers_are_bound() {
                 if binds_scene { 3 } else { 2 },
                 "{file:?} with {names:?}"
             );
-            let reads_scene =
-                effects.keeps_spheres() || effects.has(Effect::Table) || effects.has_textures();
+            let reads_scene = effects.keeps_spheres()
+                || effects.has(Effect::Table)
+                || effects.has_textures()
+                || effects.has_mixes();
             assert_eq!(binds_scene, reads_scene, "{file:?} with {names:?}");
             most = most.max(buffers);
         }

@@ -46,6 +46,8 @@ mod lights;
 mod limits;
 mod material_keys;
 mod materials;
+mod measured;
+mod mix;
 mod motion;
 mod naive;
 mod output;

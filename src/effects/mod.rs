@@ -19,7 +19,7 @@ use std::collections::BTreeSet;
 use std::sync::LazyLock;
 
 use crate::materials::texturable::textured_keys;
-use crate::materials::{Form, flakes, forms};
+use crate::materials::{Form, flakes, forms, measured, mix};
 use crate::placement::{PlacedSphere, Placement};
 use crate::scene::{Material, Scene};
 use crate::settings::Settings;
@@ -421,6 +421,26 @@ impl Effects {
         self.forms().any(|(_, form)| flakes::are_in(form))
     }
 
+    /// Whether a material is a table.
+    #[must_use]
+    pub fn has_tables(&self) -> bool {
+        self.forms().any(|(_, form)| measured::is_tabled(form))
+    }
+
+    /// Whether a material is a mix of others.
+    #[must_use]
+    pub fn has_mixes(&self) -> bool {
+        self.forms().any(|(_, form)| mix::is_mix(form))
+    }
+
+    /// Whether a material that a mix may have in it has delta lobes.
+    #[must_use]
+    pub fn mixes_deltas(&self) -> bool {
+        let has_delta = |form: &Form| form.part_delta || form.delta && !form.transmits;
+        let mut parts = self.forms().filter(|(_, form)| !mix::is_mix(form));
+        self.has_mixes() && parts.any(|(_, form)| has_delta(form))
+    }
+
     /// Whether lights are weighed at each vertex.
     #[must_use]
     pub fn weighs_lights(&self) -> bool {
@@ -458,6 +478,8 @@ impl Effects {
             ("textured", self.has_textures()),
             ("patterned", self.has_patterns()),
             ("flaked", self.has_flakes()),
+            ("mix_deltas", self.mixes_deltas()),
+            ("mixed_textures", self.has_mixes() && self.has_textures()),
             ("weighed", self.weighs_lights()),
             ("sampled", self.samples_light()),
             ("through", self.looks_through()),

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::{Effect, Row};
-use crate::materials::{Form, forms};
+use crate::materials::{Form, forms, mix};
 
 /// The forms of materials that are `wanted`.
 pub(super) fn forms_that(wanted: impl Fn(&Form) -> bool) -> Vec<Effect> {
@@ -22,6 +22,17 @@ pub(super) fn rows() -> Vec<Row> {
         .marks(["sample", "evaluate", "share"].map(|what| format!("{what}_{}", form.name)));
         if form.transmits {
             row.needs([Effect::Interior])
+        } else if mix::is_mix(form) {
+            row.needs(forms_that(|form| !form.transmits && !mix::is_mix(form)))
+                .marks([
+                    "mix",
+                    "data::MixPart",
+                    "SceneData::parts",
+                    "PART_COUNT",
+                    "share_of",
+                    "sample_part",
+                    "evaluate_part",
+                ])
         } else {
             row
         }

@@ -18,7 +18,7 @@ fn kind(
     what: &'static str,
     is_it: impl Fn(&Texture) -> bool + Send + Sync + 'static,
 ) -> Row {
-    let has = move |material: &Material| material.textures.iter().any(|t| is_it(&t.texture));
+    let has = move |material: &Material| material.looked_up().iter().any(|(_, t)| is_it(t));
     Row::new(effect, name, what, move |asked| asked.surfaces(&has)).needs(keys())
 }
 
@@ -61,7 +61,13 @@ pub(super) fn rows() -> Vec<Row> {
             Effect::Textured(number),
             flag(key),
             "this key of materials as a texture",
-            move |asked| asked.surfaces(|material| material.texture(key).is_some()),
+            move |asked| {
+                let is_it = |material: &Material| {
+                    let keys = material.looked_up();
+                    keys.iter().any(|(own, _)| own == key)
+                };
+                asked.surfaces(is_it)
+            },
         )
         .needs([
             Effect::TextureChecker,

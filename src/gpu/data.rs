@@ -8,9 +8,11 @@ use crate::effects::{Effect, Effects};
 use crate::error::{Error, Result};
 use crate::gpu::engine::{Pass, Recording};
 use crate::gpu::layout::{
-    LightRecord, MaterialRecord, PoleRecord, SKY_TABLE_WIDTH, SphereRecord, anchored_spheres,
-    light_weight, sky_table,
+    LightRecord, PoleRecord, SKY_TABLE_WIDTH, SphereRecord, anchored_spheres, light_weight,
+    sky_table,
 };
+use crate::gpu::measured::{MEASURED_WIDTH, MeasuredTables};
+use crate::gpu::tables::SceneTables;
 use crate::gpu::textures::{IMAGE_WIDTH, TextureTable};
 use crate::image::Picture;
 use crate::materials::Member;
@@ -26,6 +28,7 @@ pub(super) const TREE: &str = "tree";
 pub(super) const SKY: &str = "sky";
 pub(super) const SKY_TABLE: &str = "sky_table";
 pub(super) const IMAGES: &str = "image_texels";
+pub(super) const MEASURED: &str = "measured_texels";
 
 /// Whether the device takes the scene's data, and `partials` bytes of partial sums.
 ///
@@ -103,6 +106,28 @@ pub(super) fn check_images(
     Ok(())
 }
 
+/// Whether the device takes the tables of measured materials.
+///
+/// # Errors
+/// [`Error::DeviceLimit`] if they have too many entries together.
+pub(super) fn check_tables(
+    limits: &wgpu::Limits,
+    scene: &Scene,
+    placement: &Placement,
+) -> Result<()> {
+    let (rows, most) = (
+        MeasuredTables::new(scene, placement).rows(),
+        limits.max_texture_dimension_2d,
+    );
+    if rows > most.into() || MEASURED_WIDTH > most {
+        return Err(Error::DeviceLimit(format!(
+            "the tables of measured materials need {MEASURED_WIDTH} x {rows} texels, more than the device's limit of \
+             {most} a side; --backend cpu has no such limit"
+        )));
+    }
+    Ok(())
+}
+
 /// What the device holds of a scene.
 #[derive(Debug)]
 pub(super) struct SceneBytes {
@@ -112,6 +137,7 @@ pub(super) struct SceneBytes {
     sky: Option<(Vec<u8>, u32)>,
     sky_table: Option<Vec<u8>>,
     images: Option<Vec<u8>>,
+    measured: Option<Vec<u8>>,
 }
 
 impl SceneBytes {
@@ -126,12 +152,15 @@ impl SceneBytes {
             let tree = effects.has(Effect::Bvh).then(|| placement.tree())?;
             Some(bytemuck::cast_slice(&tree.texels).to_vec())
         };
-        let textures = TextureTable::new(scene, placement);
+        let tables = SceneTables::new(scene, placement);
         Self {
-            data: scene_data(kernel, scene, placement, effects, &textures),
+            data: scene_data(kernel, scene, placement, effects, &tables),
+            measured: effects
+                .has_tables()
+                .then(|| bytemuck::cast_slice(&tables.measured.texels()).to_vec()),
             images: effects
                 .has(Effect::TextureImage)
-                .then(|| bytemuck::cast_slice(&textures.texels()).to_vec()),
+                .then(|| bytemuck::cast_slice(&tables.textures.texels()).to_vec()),
             tree: texels(effects),
             sky: sky_of(scene, effects).map(|sky| sky_texels(sky, placement, effects)),
             sky_table: sky_of(scene, effects)
@@ -157,6 +186,9 @@ impl SceneBytes {
         }
         if let Some(images) = self.images.as_ref().filter(|_| pass.binds(IMAGES)) {
             recording.upload_texels(IMAGES, images, IMAGE_WIDTH);
+        }
+        if let Some(tables) = self.measured.as_ref().filter(|_| pass.binds(MEASURED)) {
+            recording.upload_texels(MEASURED, tables, MEASURED_WIDTH);
         }
     }
 }
@@ -197,7 +229,7 @@ fn scene_data(
     scene: &Scene,
     placement: &Placement,
     effects: &Effects,
-    textures: &TextureTable,
+    tables: &SceneTables,
 ) -> Option<Vec<u8>> {
     let (members, size) = kernel.struct_members("SceneData")?;
     let mut bytes = vec![0; size as usize];
@@ -207,9 +239,11 @@ fn scene_data(
             "spheres" => spheres(kernel, placement),
             "poles" => poles(kernel, placement),
             "attributes" => attributes(scene, placement, effects),
-            "materials" => materials(kernel, scene, placement, effects, textures),
-            "patterns" => patterns(kernel, textures),
-            "images" => bytemuck::cast_slice(textures.images()).to_vec(),
+            "materials" => materials(kernel, scene, placement, effects, tables),
+            "patterns" => patterns(kernel, &tables.textures),
+            "images" => bytemuck::cast_slice(tables.textures.images()).to_vec(),
+            "parts" => parts(kernel, effects, tables),
+            "part_weights" => bytemuck::cast_slice(tables.mixes.weights()).to_vec(),
             "lights" => lights(kernel, placement, effects),
             other => unreachable!("no scene data {other}"),
         };
@@ -276,32 +310,34 @@ fn attributes(scene: &Scene, placement: &Placement, effects: &Effects) -> Vec<u8
     bytes_of(words.into_iter())
 }
 
+/// The members of the kernel's `Material`, where each is, and its size.
+fn material_layout(kernel: &Kernel, effects: &Effects) -> (Vec<(Member, u32)>, u32) {
+    let (offsets, size) = kernel.struct_members("Material").unwrap_or_default();
+    let members = std::iter::zip(material_members(effects), offsets);
+    let members = members.map(|(member, (_, offset))| (member, offset));
+    (members.collect(), size)
+}
+
 fn materials(
     kernel: &Kernel,
     scene: &Scene,
     placement: &Placement,
     effects: &Effects,
-    textures: &TextureTable,
+    tables: &SceneTables,
 ) -> Vec<u8> {
-    let (offsets, size) = kernel.struct_members("Material").unwrap_or_default();
-    let members: Vec<(Member, u32)> = std::iter::zip(material_members(effects), offsets)
-        .map(|(member, (_, offset))| (member, offset))
-        .collect();
-    let shared = scene.materials.iter().enumerate();
-    let shared = shared.map(|(i, m)| {
-        let record = MaterialRecord::new(m, placement.radiance_scale, placement.scale);
-        record.with_textures(m, textures.of_material(i))
-    });
-    let anchored = anchored_spheres(scene, placement).map(|i| {
-        let sphere = &placement.spheres[i];
-        let record = MaterialRecord::of_sphere(sphere, scene, placement);
-        let numbers = textures.of_sphere(i, placement);
-        record.with_textures(&scene.materials[sphere.material], numbers)
-    });
+    let (members, size) = material_layout(kernel, effects);
+    let shared = (0..scene.materials.len()).map(|i| tables.of_material(i, scene, placement));
+    let anchored = anchored_spheres(scene, placement);
+    let anchored = anchored.map(|i| tables.of_sphere(i, scene, placement));
     let records = shared.chain(anchored);
     records
         .flat_map(|record| record.bytes(&members, size))
         .collect()
+}
+
+fn parts(kernel: &Kernel, effects: &Effects, tables: &SceneTables) -> Vec<u8> {
+    let (members, size) = material_layout(kernel, effects);
+    tables.mixes.bytes(kernel, (&members, size))
 }
 
 fn patterns(kernel: &Kernel, textures: &TextureTable) -> Vec<u8> {

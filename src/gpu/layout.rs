@@ -354,10 +354,8 @@ pub fn anchored_spheres<'a>(
     scene: &'a Scene,
     placement: &'a Placement,
 ) -> impl Iterator<Item = usize> + 'a {
-    let is_anchored = move |i: &usize| {
-        let material = &scene.materials[placement.spheres[*i].material];
-        !material.kind.form().anchored.is_empty() || material.has_patterns()
-    };
+    let is_anchored =
+        move |i: &usize| scene.materials[placement.spheres[*i].material].is_anchored();
     (0..placement.poles).filter(is_anchored)
 }
 
@@ -417,10 +415,19 @@ impl MaterialRecord {
         self
     }
 
-    /// That of a sphere's material, with what depends on where its pole is.
+    /// The same with a number that only the whole scene tells, of a material that has this member.
     #[must_use]
-    pub fn of_sphere(sphere: &PlacedSphere, scene: &Scene, placement: &Placement) -> Self {
-        let material = &scene.materials[sphere.material];
+    pub fn with_word(mut self, member: Member, word: u32) -> Self {
+        let mut values = self.values.iter_mut();
+        if let Some((_, value)) = values.find(|(own, _)| *own == member) {
+            *value = MemberValue::Word(word);
+        }
+        self
+    }
+
+    /// That of a material, with what depends on where the pole of a sphere is.
+    #[must_use]
+    pub fn of_sphere(material: &Material, sphere: &PlacedSphere, placement: &Placement) -> Self {
         let mut record = Self::new(material, placement.radiance_scale, placement.scale);
         if sphere.pole.is_some() {
             let members = material.kind.form().anchored.iter().copied();

@@ -81,6 +81,9 @@ impl GpuRenderer {
         if effects.has(Effect::TextureImage) {
             data::check_images(&gpu.limits, scene, placement)?;
         }
+        if effects.has_tables() {
+            data::check_tables(&gpu.limits, scene, placement)?;
+        }
 
         let program = Program::new(&gpu, "path", kernel);
         let mut constants = vec![("MAX_BOUNCES", f64::from(settings.max_bounces))];

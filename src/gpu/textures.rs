@@ -49,6 +49,15 @@ pub struct ImageRecord {
 /// The numbers by which the kernel knows the textures of some keys.
 pub type Numbers = Vec<(&'static str, u32)>;
 
+/// Those of a part of a mix.
+#[derive(Clone, Debug, Default)]
+pub struct PartNumbers {
+    /// Of its own keys.
+    pub own: Numbers,
+    /// Of the weights of mixes in the mix, and whether each is the share of the second of the two.
+    pub weights: Vec<[u32; 2]>,
+}
+
 /// All textures of a scene's spheres.
 #[derive(Clone, Debug, Default)]
 pub struct TextureTable {
@@ -57,8 +66,8 @@ pub struct TextureTable {
     /// Each once, with the place of its first texel.
     pictures: Vec<(Arc<Picture>, u64)>,
     texels: u64,
-    of_materials: Vec<Numbers>,
-    of_spheres: BTreeMap<usize, Numbers>,
+    of_materials: Vec<(Numbers, Vec<PartNumbers>)>,
+    of_spheres: BTreeMap<usize, (Numbers, Vec<PartNumbers>)>,
 }
 
 impl TextureTable {
@@ -66,15 +75,19 @@ impl TextureTable {
     #[must_use]
     pub fn new(scene: &Scene, placement: &Placement) -> Self {
         let mut table = Self::default();
-        if scene.materials.iter().all(|m| m.textures.is_empty()) {
-            table.of_materials = vec![Numbers::new(); scene.materials.len()];
+        let without = |material: &Material| {
+            let parts = vec![PartNumbers::default(); material.kind.parts().len()];
+            (Numbers::new(), parts)
+        };
+        if scene.materials.iter().all(|m| m.looked_up().is_empty()) {
+            table.of_materials = scene.materials.iter().map(without).collect();
             return table;
         }
         let used: BTreeSet<usize> = placement.spheres.iter().map(|s| s.material).collect();
         for (index, material) in scene.materials.iter().enumerate() {
             let numbers = match used.contains(&index) {
-                true => table.add(material, DVec3::ZERO, placement),
-                false => Numbers::new(),
+                true => table.add_all(material, DVec3::ZERO, placement),
+                false => without(material),
             };
             table.of_materials.push(numbers);
         }
@@ -82,12 +95,30 @@ impl TextureTable {
             let sphere = &placement.spheres[index];
             let material = &scene.materials[sphere.material];
             let numbers = match material.has_patterns() {
-                true => table.add(material, sphere.anchor_offset(placement.scale), placement),
+                true => table.add_all(material, sphere.anchor_offset(placement.scale), placement),
                 false => table.of_materials[sphere.material].clone(),
             };
             table.of_spheres.insert(index, numbers);
         }
         table
+    }
+
+    /// Adds the textures of a material and of its parts for spheres whose anchor is there.
+    fn add_all(
+        &mut self,
+        material: &Material,
+        anchor: DVec3,
+        placement: &Placement,
+    ) -> (Numbers, Vec<PartNumbers>) {
+        let own = self.add(material, anchor, placement);
+        let parts = material.kind.parts().iter().map(|part| PartNumbers {
+            own: self.add(&part.material, anchor, placement),
+            weights: part
+                .texture_weights()
+                .map(|(second, texture)| [self.number(texture, anchor, 1.0), second.into()])
+                .collect(),
+        });
+        (own, parts.collect())
     }
 
     /// Adds the textures of a material for spheres whose anchor is there.
@@ -182,12 +213,28 @@ impl TextureTable {
     /// The textures of a material, for spheres about their centres.
     #[must_use]
     pub fn of_material(&self, index: usize) -> &Numbers {
-        &self.of_materials[index]
+        &self.of_materials[index].0
+    }
+
+    /// Those of its parts.
+    #[must_use]
+    pub fn parts_of_material(&self, index: usize) -> &[PartNumbers] {
+        &self.of_materials[index].1
     }
 
     /// Those of a sphere of the placement.
     #[must_use]
     pub fn of_sphere(&self, index: usize, placement: &Placement) -> &Numbers {
+        &self.all_of_sphere(index, placement).0
+    }
+
+    /// Those of the parts of its material.
+    #[must_use]
+    pub fn parts_of_sphere(&self, index: usize, placement: &Placement) -> &[PartNumbers] {
+        &self.all_of_sphere(index, placement).1
+    }
+
+    fn all_of_sphere(&self, index: usize, placement: &Placement) -> &(Numbers, Vec<PartNumbers>) {
         let own = self.of_spheres.get(&index);
         own.unwrap_or(&self.of_materials[placement.spheres[index].material])
     }

@@ -49,7 +49,12 @@ impl Pair {
     /// Of a direction and its reflection about `h`.
     #[must_use]
     pub fn about(o: DVec3, h: DVec3) -> Self {
-        let cos_h = o.dot(h).min(1.0);
+        Self::of(o, h, o.dot(h).min(1.0))
+    }
+
+    /// The same where the cosine of the two is known.
+    #[must_use]
+    pub fn of(o: DVec3, h: DVec3, cos_h: f64) -> Self {
         let i = 2.0 * cos_h * h - o;
         Self { o, i, h, cos_h }
     }
@@ -77,12 +82,18 @@ impl Lobes {
                 event: Event::GLOSSY,
             };
         }
-        let wide = luminance(self.glossy) < luminance(self.diffuse);
         BsdfValue {
             f_cos: self.diffuse + self.glossy,
             pdf: self.pdf,
-            event: if wide { Event::DIFFUSE } else { Event::GLOSSY },
+            event: self.event(),
         }
+    }
+
+    /// What happens: whatever sends the most light.
+    #[must_use]
+    pub fn event(&self) -> Event {
+        let wide = luminance(self.glossy) < luminance(self.diffuse);
+        if wide { Event::DIFFUSE } else { Event::GLOSSY }
     }
 
     /// The answer of `sample`.

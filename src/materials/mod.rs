@@ -24,13 +24,15 @@ mod uniform;
 mod value;
 
 use std::ops::Deref;
-use std::sync::LazyLock;
+use std::sync::{Arc, LazyLock};
 
 use glam::DVec3;
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::Deserialize;
 
 use dielectric::Index;
+use measured::BrdfTable;
+use mix::Part;
 
 pub use contract::{BsdfSample, BsdfValue, Event, Surface};
 pub use form::{Form, Member, MemberKind, MemberValue};
@@ -91,6 +93,25 @@ pub trait Bsdf {
     /// What is absorbed of light on its inner side, per unit length of the scene, by channel.
     fn absorption(&self) -> DVec3 {
         DVec3::ZERO
+    }
+
+    /// What was measured, of one that is a table.
+    fn table(&self) -> Option<&Arc<BrdfTable>> {
+        None
+    }
+
+    /// What it is a mix of.
+    fn parts(&self) -> &[Part] {
+        &[]
+    }
+
+    /// The same with what does not follow from its parameters, as files' content, from the one that it was made of.
+    #[must_use]
+    fn with_files_of(self, _: &Self) -> Self
+    where
+        Self: Sized,
+    {
+        self
     }
 
     /// What is wrong with its parameters together.
@@ -186,7 +207,10 @@ macro_rules! materials {
             pub fn with(&self, changes: &[(&'static str, Value)]) -> Self {
                 let parameters = self.parameters();
                 match self {
-                    $(Self::$Type(_) => Self::$Type(value::made_of(parameters, changes))),*
+                    $(Self::$Type(own) => {
+                        let made: $module::$Type = value::made_of(parameters, changes);
+                        Self::$Type(made.with_files_of(own))
+                    }),*
                 }
             }
         }
@@ -222,6 +246,8 @@ materials! {
     sheen::Sheen,
     nylon::Nylon,
     car_paint::CarPaint,
+    measured::Measured,
+    mix::Mix,
 }
 
 impl MaterialKind {
@@ -261,8 +287,10 @@ impl MaterialKind {
 pub fn forms() -> &'static [&'static Form] {
     static FORMS: LazyLock<Vec<&'static Form>> = LazyLock::new(|| {
         let mut forms: Vec<&Form> = ALL.iter().flat_map(|material| material.forms).collect();
-        // Rough glass last: so the others keep the codes that they had before it, and kernels their text.
-        forms.sort_by_key(|form| form.is_translucent());
+        // Rough glass after those that were there before it, and what came later after it: so these keep their codes, and
+        // kernels their text.
+        let is_later = |form: &Form| measured::is_tabled(form) || mix::is_mix(form);
+        forms.sort_by_key(|form| (is_later(form), form.is_translucent()));
         forms
     });
     &FORMS

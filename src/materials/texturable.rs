@@ -10,6 +10,8 @@ use super::{ALL, Form, Member, Value, schema};
 pub const EMISSION: &str = "emission";
 /// The key that decides whether a surface is smooth.
 pub const ROUGHNESS: &str = "roughness";
+/// The key of a mix that says how much of it the second material is.
+pub const WEIGHT: &str = "weight";
 
 /// A key of one type of materials whose value may be a texture.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -16,6 +16,15 @@ pub enum Value {
     Pair(DVec2),
     /// Several colours or vectors.
     Vectors(Vec<DVec3>),
+    /// Names of other materials.
+    Names(Vec<String>),
+    /// The name of a file, and a hash of what of it counts.
+    File {
+        /// As the scene file has it.
+        name: String,
+        /// That is the same for files with other names and the same content.
+        content: u64,
+    },
     /// An inline table.
     Table(Vec<(&'static str, Value)>),
 }
@@ -57,6 +66,8 @@ impl<'de> Deserializer<'de> for Value {
             Self::Vectors(all) => {
                 visitor.visit_seq(SeqDeserializer::new(all.into_iter().map(Self::Vector)))
             }
+            Self::Names(names) => visitor.visit_seq(SeqDeserializer::new(names.into_iter())),
+            Self::File { name, .. } => visitor.visit_string(name),
             Self::Table(values) => visitor.visit_map(MapDeserializer::new(values.into_iter())),
         }
     }

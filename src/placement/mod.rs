@@ -59,9 +59,22 @@ pub struct Placement {
     pub offset: Offset,
     /// What light sampling chooses from.
     pub lights: Lights,
+    /// The most parts of a sphere's mix, and the most weights of one that are textures.
+    pub mixed: [usize; 2],
     /// Made when it is first asked for, and so is the next.
     tree: OnceLock<Tree>,
     sky: OnceLock<Arc<SkyTable>>,
+}
+
+/// See [`Placement::mixed`].
+fn mixed(scene: &Scene, spheres: &[PlacedSphere]) -> [usize; 2] {
+    let mut most = [0; 2];
+    for sphere in spheres {
+        let parts = scene.materials[sphere.material].kind.parts();
+        let weights = parts.iter().map(|part| part.texture_weights().count());
+        most = [most[0].max(parts.len()), most[1].max(weights.sum())];
+    }
+    most
 }
 
 impl Placement {
@@ -147,6 +160,7 @@ impl Placement {
             enclosed,
             coincident,
             lights: Lights::new(scene, &spheres, offset),
+            mixed: mixed(scene, &spheres),
             spheres,
             poles,
             media,

@@ -5,10 +5,11 @@ use glam::DVec3;
 use super::Told;
 use crate::effects::{BAKED_MOST, Effect};
 use crate::job::{Job, prepare};
-use crate::materials::texturable::{EMISSION, texturable_key, textured_keys};
+use crate::materials::mix::Weight;
+use crate::materials::texturable::{EMISSION, WEIGHT, texturable_key, textured_keys};
 use crate::materials::{MaterialKind, dielectric::Dielectric, diffuse::Diffuse, forms};
 use crate::sampler::Sampler;
-use crate::scene::{Scene, Texture, Textured};
+use crate::scene::{Material, Scene, Texture, Textured};
 use crate::settings::{GeometryChoice, Integrator, LightSampling, Offset, Settings};
 
 /// What stands in an effect's place.
@@ -124,20 +125,20 @@ fn change(
             "the index of yellow light for all"
         }
         Effect::TextureChecker => {
-            keep_textures(scene, |t| !matches!(t.texture, Texture::Checker { .. }));
+            keep_textures(scene, |_, t| !matches!(t, Texture::Checker { .. }));
             "its largest value all over"
         }
         Effect::TextureNoise => {
-            keep_textures(scene, |t| !matches!(t.texture, Texture::Noise { .. }));
+            keep_textures(scene, |_, t| !matches!(t, Texture::Noise { .. }));
             "its largest value all over"
         }
         Effect::TextureImage => {
-            keep_textures(scene, |t| !matches!(t.texture, Texture::Image(_)));
+            keep_textures(scene, |_, t| !matches!(t, Texture::Image(_)));
             "its largest value all over"
         }
         Effect::Textured(number) => {
             let key = textured_keys()[number as usize];
-            keep_textures(scene, |t| t.key.key != key);
+            keep_textures(scene, |own, _| own != key);
             "its largest value all over"
         }
         Effect::Emission => {
@@ -179,22 +180,44 @@ fn change(
     })
 }
 
+/// All materials, and the parts of mixes.
+fn each(scene: &mut Scene, mut change: impl FnMut(&mut Material)) {
+    for material in &mut scene.materials {
+        change(material);
+        if let MaterialKind::Mix(mix) = &mut material.kind {
+            mix.parts
+                .iter_mut()
+                .for_each(|part| change(&mut part.material));
+        }
+    }
+}
+
 /// Puts other materials in the place of those that `other` has something for.
 fn replace(scene: &mut Scene, other: impl Fn(&MaterialKind) -> Option<MaterialKind>) {
-    for material in &mut scene.materials {
+    each(scene, |material| {
         if let Some(kind) = other(&material.kind) {
             let kept = |t: &Textured| texturable_key(kind.name(), t.key.key) == Some(t.key);
             material.textures.retain(kept);
             material.kind = kind;
         }
-    }
+    });
 }
 
 /// Leaves the other textures' largest values, which their materials have.
-fn keep_textures(scene: &mut Scene, is_kept: impl Fn(&Textured) -> bool) {
-    for material in &mut scene.materials {
-        material.textures.retain(&is_kept);
-    }
+fn keep_textures(scene: &mut Scene, is_kept: impl Fn(&str, &Texture) -> bool) {
+    each(scene, |material| {
+        material.textures.retain(|t| is_kept(t.key.key, &t.texture));
+        let MaterialKind::Mix(mix) = &mut material.kind else {
+            return;
+        };
+        for factor in mix.parts.iter_mut().flat_map(|part| &mut part.inner) {
+            if let Weight::Texture(texture) = &factor.weight
+                && !is_kept(WEIGHT, texture)
+            {
+                factor.weight = Weight::Number(texture.largest().x);
+            }
+        }
+    });
 }
 
 /// The same glass without absorption.

@@ -7,7 +7,9 @@ use glam::DVec3;
 
 use super::load::Loaded;
 use super::{Environment, Gradient, Handedness, Scene, Texture, Textured};
+use crate::materials::measured::Measured;
 use crate::materials::texturable::EMISSION;
+use crate::materials::{Bsdf as _, MaterialKind};
 use crate::numbers::significant;
 
 /// So many lights are listed one by one.
@@ -15,6 +17,9 @@ const LIGHTS_LISTED: usize = 8;
 
 /// And so many textures.
 const TEXTURES_LISTED: usize = 16;
+
+/// And so many measured materials.
+const TABLES_LISTED: usize = 16;
 
 /// The summary that `scene check` prints: image, camera, spheres by material, lights. Lines end
 /// with a newline; the warnings are not in it.
@@ -64,6 +69,7 @@ fn write(text: &mut String, loaded: &Loaded) -> fmt::Result {
     }
     textures(text, scene)?;
     motion(text, scene)?;
+    tables(text, scene)?;
     lights(text, scene)
 }
 
@@ -83,6 +89,33 @@ fn motion(text: &mut String, scene: &Scene) -> fmt::Result {
         counted(moving.len(), "sphere"),
         significant(longest)
     )
+}
+
+fn tables(text: &mut String, scene: &Scene) -> fmt::Result {
+    let all: Vec<(&str, &Measured)> = scene
+        .materials
+        .iter()
+        .filter_map(|material| match &material.kind {
+            MaterialKind::Measured(measured) => Some((material.name.as_str(), measured)),
+            _ => None,
+        })
+        .collect();
+    if all.is_empty() {
+        return Ok(());
+    }
+    writeln!(text, "measured     {}", all.len())?;
+    for (name, measured) in all.iter().take(TABLES_LISTED) {
+        let file = measured.file.escape_debug();
+        let most = significant(measured.albedo().max_element());
+        writeln!(
+            text,
+            "  {name}: {file}, which scatters at most {most} of the light"
+        )?;
+    }
+    if all.len() > TABLES_LISTED {
+        writeln!(text, "  and {} more", all.len() - TABLES_LISTED)?;
+    }
+    Ok(())
 }
 
 fn textures(text: &mut String, scene: &Scene) -> fmt::Result {

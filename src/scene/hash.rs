@@ -10,6 +10,8 @@ use glam::DVec3;
 
 use super::{Environment, Gradient, Handedness, Scene, Texture, Textured};
 use crate::image::Picture;
+use crate::materials::mix::Weight;
+use crate::materials::texturable::WEIGHT;
 use crate::materials::{MaterialKind, Value};
 
 /// Hash of everything in the scene that the image depends on: 16 hexadecimal digits.
@@ -52,8 +54,8 @@ pub fn content_hash(scene: &Scene) -> String {
         let material = &scene.materials[sphere.material];
         hash.vector(material.emission);
         hash.kind(&material.kind);
-        for textured in &material.textures {
-            hash.texture(textured);
+        for Textured { key, texture } in &material.textures {
+            hash.texture(key.key, texture);
         }
     }
     format!("{:016x}", hash.0.finish())
@@ -131,8 +133,8 @@ impl Fnv {
         }
     }
 
-    fn texture(&mut self, Textured { key, texture }: &Textured) {
-        self.bytes(key.key.as_bytes());
+    fn texture(&mut self, key: &str, texture: &Texture) {
+        self.bytes(key.as_bytes());
         match texture {
             Texture::Checker { values, size } => {
                 self.bytes(b"checker");
@@ -164,6 +166,20 @@ impl Fnv {
         for (_, value) in kind.parameters() {
             self.value(value);
         }
+        for part in kind.parts() {
+            self.byte(part.second.into());
+            for factor in &part.inner {
+                self.byte(factor.second.into());
+                match &factor.weight {
+                    Weight::Number(weight) => self.number(*weight),
+                    Weight::Texture(texture) => self.texture(WEIGHT, texture),
+                }
+            }
+            self.kind(&part.material.kind);
+            for Textured { key, texture } in &part.material.textures {
+                self.texture(key.key, texture);
+            }
+        }
     }
 
     fn value(&mut self, value: Value) {
@@ -175,6 +191,9 @@ impl Fnv {
                 self.number(pair.y);
             }
             Value::Vectors(vectors) => vectors.into_iter().for_each(|v| self.vector(v)),
+            // What they name counts.
+            Value::Names(_) => {}
+            Value::File { content, .. } => self.bytes(&content.to_le_bytes()),
             // Tables may be left out: their keys say which there are.
             Value::Table(values) => {
                 for (key, value) in values {
@@ -234,6 +253,8 @@ mod tests {
             MaterialKind::Sheen(m) => m.roughness += 0.1,
             MaterialKind::Nylon(m) => m.a.y += 0.1,
             MaterialKind::CarPaint(m) => m.m = None,
+            MaterialKind::Measured(m) => m.scale.x += 0.1,
+            MaterialKind::Mix(m) => m.weight += 0.1,
         };
         let gradient = |zenith| {
             let [horizon, ground] = [DVec3::ZERO; 2];

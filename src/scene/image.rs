@@ -1,10 +1,8 @@
 //! Images that a scene names: files of EXR, PNG or JPEG as linear RGB.
 
-use std::fs::{self, File};
-use std::io::Read as _;
 use std::path::Path;
 
-use super::MAX_SIDE;
+use super::{MAX_SIDE, named};
 use crate::image::Picture;
 use crate::input;
 
@@ -21,23 +19,7 @@ const MOST_TEXELS: u64 = 1 << 27;
 pub(super) fn load(path: &Path, linear: bool) -> Result<Picture, String> {
     let shown = path.display().to_string();
     let shown = shown.escape_debug();
-    let unread = |error: std::io::Error| format!("cannot read {shown}: {error}");
-    let about = fs::metadata(path).map_err(unread)?;
-    // Before it is opened: a pipe would wait, and a device may have no end.
-    if !about.is_file() {
-        return Err(format!("{shown} is no regular file"));
-    }
-    let too_long = || format!("{shown} is longer than {MOST_BYTES} bytes, the limit");
-    if about.len() > MOST_BYTES {
-        return Err(too_long());
-    }
-    let mut bytes = Vec::new();
-    let file = File::open(path).map_err(unread)?;
-    let mut file = file.take(MOST_BYTES + 1);
-    file.read_to_end(&mut bytes).map_err(unread)?;
-    if bytes.len() as u64 > MOST_BYTES {
-        return Err(too_long());
-    }
+    let bytes = named::read(path, MOST_BYTES)?;
     let image = input::texels(&bytes, linear, MOST_TEXELS);
     let mut image = image.map_err(|error| format!("{shown}: {error}"))?;
     if image.width.max(image.height) > MAX_SIDE {

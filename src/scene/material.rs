@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use glam::DVec3;
 
 use super::texture::{Texture, Textured};
-use crate::materials::texturable::{EMISSION, ROUGHNESS};
+use crate::materials::texturable::{EMISSION, ROUGHNESS, WEIGHT};
 use crate::materials::{Form, MaterialKind, Texturable, Value};
 
 /// A named material.
@@ -64,11 +64,30 @@ impl Material {
             .map(|textured| &textured.texture)
     }
 
-    /// Whether the pattern of one of its textures is about the sphere's centre.
+    /// All textures that are looked up where it is, with their keys: its own, those of a mix's parts, and weights of
+    /// mixes in the mix.
+    #[must_use]
+    pub fn looked_up(&self) -> Vec<(&'static str, &Texture)> {
+        let own = self.textures.iter().map(|t| (t.key.key, &t.texture));
+        let parts = self.kind.parts().iter().flat_map(|part| {
+            let weights = part.texture_weights().map(|(_, texture)| (WEIGHT, texture));
+            part.material.looked_up().into_iter().chain(weights)
+        });
+        own.chain(parts).collect()
+    }
+
+    /// Whether the pattern of one of these is about the sphere's centre.
     #[must_use]
     pub fn has_patterns(&self) -> bool {
-        let mut all = self.textures.iter();
-        all.any(|textured| !matches!(textured.texture, Texture::Image(_)))
+        let all = self.looked_up();
+        let mut all = all.iter();
+        all.any(|(_, texture)| !matches!(texture, Texture::Image(_)))
+    }
+
+    /// Whether the kernel has a record of it for each sphere that is about its pole.
+    #[must_use]
+    pub fn is_anchored(&self) -> bool {
+        self.has_patterns() || self.forms().any(|form| !form.anchored.is_empty())
     }
 
     /// The mean of what is emitted over a sphere.
@@ -77,11 +96,17 @@ impl Material {
         self.texture(EMISSION).map_or(self.emission, Texture::mean)
     }
 
-    /// The forms that it has somewhere: that of `kind`, and the smooth one where its roughness is 0.
+    /// The forms that it has somewhere: that of `kind`, and the smooth one where its roughness is 0; of a mix those of its
+    /// parts, too.
     pub fn forms(&self) -> impl Iterator<Item = &'static Form> {
         let own = self.kind.form();
         let smooth = self.smooth_form();
-        std::iter::once(own).chain(smooth.filter(move |smooth| *smooth != own))
+        let parts = self.kind.parts().iter();
+        let parts: Vec<&Form> = parts
+            .flat_map(|part| part.material.forms().collect::<Vec<_>>())
+            .collect();
+        let own = std::iter::once(own).chain(smooth.filter(move |smooth| *smooth != own));
+        own.chain(parts)
     }
 
     /// The form where its roughness is 0, if that is a texture and 0 somewhere.

@@ -12,7 +12,10 @@ mod hash;
 mod image;
 pub mod load;
 pub mod material;
+mod measured;
+mod mix;
 pub mod motion;
+mod named;
 pub mod particles;
 mod pieces;
 #[cfg(test)]

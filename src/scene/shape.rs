@@ -247,6 +247,9 @@ fn check_value(
 /// What a vector or a matrix is.
 fn an_array(schema: &Value) -> String {
     let count = |schema: &Value| schema["minItems"].as_u64().unwrap_or_default();
+    if schema["items"]["type"] == "string" {
+        return format!("an array of {} names", count(schema));
+    }
     match count(&schema["items"]) {
         0 => format!("an array of {} numbers", count(schema)),
         inner => format!("an array of {} arrays of {inner} numbers", count(schema)),
@@ -267,6 +270,7 @@ fn length(name: &str, span: Range<usize>, length: usize, schema: &Value, report:
             // Of a texture.
             Some(_) if wanted == 2 => "values",
             Some(_) => "rows",
+            None if schema["items"]["type"] == "string" => "names",
             None => "numbers",
         };
         let has = if length == 0 {

@@ -14,7 +14,9 @@ use super::particles;
 use super::report::{Problem, Report, SHOWN};
 use super::suggest::{list, nearest};
 use super::texture_table::{self, Textures};
-use super::{Camera, Handedness, Material, RenderDefaults, Scene, Sphere, environment};
+use super::{
+    Camera, Handedness, Material, RenderDefaults, Scene, Sphere, environment, measured, mix,
+};
 use crate::materials::Mistake;
 
 /// Directions whose angle has a smaller sine are parallel: of the sixteen digits of an f64 the
@@ -190,6 +192,14 @@ pub(super) fn scene(
         &mut files,
         report,
     );
+    measured::apply(
+        &mut materials[..own],
+        keys,
+        place.folder,
+        &mut files,
+        report,
+    );
+    mix::apply(&mut materials[..own], keys, &mut used, report);
     let environment = file.environment.as_ref();
     let environment = environment
         .and_then(|table| environment::of_table(table, place.folder, &mut files, report));
@@ -399,7 +409,7 @@ fn material(name: String, table: MaterialTable) -> Material {
     }
 }
 
-fn unknown_material(name: &str, materials: &[Material]) -> Problem {
+pub(super) fn unknown_material(name: &str, materials: &[Material]) -> Problem {
     let names = || materials.iter().map(|material| material.name.as_str());
     let label =
         nearest(name, names()).map_or_else(String::new, |near| format!("did you mean \"{near}\"?"));

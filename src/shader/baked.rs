@@ -8,7 +8,7 @@ use glam::DVec3;
 use super::bsdf::members;
 use crate::effects::{Effect, Effects};
 use crate::gpu::layout::{MaterialRecord, light_weight};
-use crate::gpu::textures::TextureTable;
+use crate::gpu::tables::SceneTables;
 use crate::placement::{PlacedSphere, Placement, Side};
 use crate::scene::Scene;
 
@@ -211,14 +211,10 @@ fn frame_of(text: &mut String, placement: &Placement, effects: &Effects) {
 }
 
 fn material_of(text: &mut String, scene: &Scene, placement: &Placement, effects: &Effects) {
-    let textures = TextureTable::new(scene, placement);
-    let spheres = placement.spheres.iter().enumerate();
+    let tables = SceneTables::new(scene, placement);
+    let spheres = 0..placement.spheres.len();
     let records: Vec<MaterialRecord> = spheres
-        .map(|(i, s)| {
-            let record = MaterialRecord::of_sphere(s, scene, placement);
-            let numbers = textures.of_sphere(i, placement);
-            record.with_textures(&scene.materials[s.material], numbers)
-        })
+        .map(|i| tables.of_sphere(i, scene, placement))
         .collect();
     *text += "fn material_of(index: u32) -> Material {\nvar material: Material;\n";
     for member in members(effects) {

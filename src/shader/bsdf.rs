@@ -2,9 +2,9 @@
 
 use std::fmt::Write as _;
 
-use super::textures;
+use super::{mixes, textures};
 use crate::effects::{Effect, Effects};
-use crate::materials::{Form, Member, MemberKind};
+use crate::materials::{Form, Member, MemberKind, mix};
 
 /// The members of `Material` in a kernel with `effects`, in its order: what all materials have, and what
 /// the forms in use need. A vector is followed by a scalar as long as there are both, so that they share
@@ -37,7 +37,11 @@ pub fn members(effects: &Effects) -> Vec<Member> {
             }
         }
     }
-    own.extend(textures::members(effects));
+    for member in textures::members(effects) {
+        if !own.contains(&member) {
+            own.push(member);
+        }
+    }
     let (vectors, scalars): (Vec<Member>, Vec<Member>) =
         own.into_iter().partition(|m| m.kind == MemberKind::Vector);
     let mut members = vec![Member::vector("color"), Member::word("kind")];
@@ -56,25 +60,33 @@ pub(super) fn module(effects: &Effects) -> String {
     let mut text =
         String::from("import package::materials::contract::{Surface, BsdfSample, BsdfValue};\n");
     let lecture = effects.has(Effect::Lecture);
+    let mixed = forms.iter().find(|(_, form)| mix::is_mix(form));
+    let deltas = effects.mixes_deltas();
     for (name, drawn) in [
         ("sample_uniform", Drawn::Uniform),
         ("sample_beside", Drawn::Beside),
     ] {
         if forms
             .iter()
-            .any(|(_, form)| Drawn::of(form, lecture) == drawn)
+            .any(|(_, form)| match mix::is_mix(form) && !deltas {
+                true => lecture && drawn == Drawn::Uniform,
+                false => Drawn::of(form, lecture) == drawn,
+            })
         {
             let _ = writeln!(text, "import package::materials::uniform::{name};");
         }
     }
-    for (_, form) in &forms {
+    if let Some((_, form)) = mixed {
+        text += &mixes::imports(form, lecture, deltas);
+    }
+    for (_, form) in forms.iter().filter(|(_, form)| !mix::is_mix(form)) {
         let (name, module) = (form.name, form.material.replace('-', "_"));
         // Writing to a String cannot fail.
         let drawn = Drawn::of(form, lecture);
         if drawn != Drawn::Uniform {
             let _ = writeln!(text, "import package::materials::{module}::sample_{name};");
         }
-        if drawn == Drawn::Beside {
+        if drawn == Drawn::Beside || deltas && form.part_delta {
             let _ = writeln!(text, "import package::materials::{module}::share_{name};");
         }
         if !form.delta {
@@ -97,33 +109,36 @@ pub(super) fn module(effects: &Effects) -> String {
         let _ = writeln!(text, "{}: {ty},", member.name);
     }
     text += "}\n";
-    let samples: Vec<(u32, String)> = forms
-        .iter()
+    let plain = || forms.iter().filter(|(_, form)| !mix::is_mix(form));
+    let samples: Vec<(u32, String)> = plain()
         .map(|(code, form)| (*code, sampled(form, lecture)))
         .collect();
-    let evaluated: Vec<(u32, String)> = forms
-        .iter()
-        .filter(|(_, form)| !form.delta)
-        .map(|(code, form)| {
-            (
-                *code,
-                format!("return evaluate_{}(surface, wo, wi);", form.name),
-            )
-        })
+    let evaluated: Vec<(u32, String)> = plain()
+        // Of a mix, delta lobes are asked as well.
+        .filter(|(_, form)| !form.delta || mixed.is_some())
+        .map(|(code, form)| (*code, evaluated(form)))
         .collect();
-    text += "fn sample(surface: Surface, wo: vec3f, u: vec4f) -> BsdfSample {\n";
+    // Of a mix, both are of its parts.
+    let part = if mixed.is_some() { "_part" } else { "" };
+    let _ = writeln!(
+        text,
+        "fn sample{part}(surface: Surface, wo: vec3f, u: vec4f) -> BsdfSample {{"
+    );
     text += &dispatch(
         "surface.material",
         samples,
         "return BsdfSample(surface.normal, vec3f(0.0), 0.0, 0u, 1.0);",
     );
-    text += "}\nfn evaluate(surface: Surface, wo: vec3f, wi: vec3f) -> BsdfValue {\n";
-    text += &dispatch(
-        "surface.material",
-        evaluated,
-        "return BsdfValue(vec3f(0.0), 0.0, 0u);",
+    let _ = writeln!(
+        text,
+        "}}\nfn evaluate{part}(surface: Surface, wo: vec3f, wi: vec3f) -> BsdfValue {{"
     );
+    text += &dispatch("surface.material", evaluated, NO_VALUE);
     text += "}\n";
+    if let Some((_, form)) = mixed {
+        text += &mixes::functions(form, &forms, lecture, deltas);
+        text += &predicate("is_mix", &forms, mix::is_mix);
+    }
     if effects.has_textures() {
         text += &textures::with_textures(effects);
     }
@@ -131,6 +146,17 @@ pub(super) fn module(effects: &Effects) -> String {
     text += &predicate("transmits", &forms, |form| form.transmits);
     text += &predicate("is_translucent", &forms, Form::is_translucent);
     text
+}
+
+/// What `evaluate` says of what has no value.
+const NO_VALUE: &str = "return BsdfValue(vec3f(0.0), 0.0, 0u);";
+
+/// What `evaluate` does for a form.
+fn evaluated(form: &Form) -> String {
+    match form.delta {
+        true => NO_VALUE.into(),
+        false => format!("return evaluate_{}(surface, wo, wi);", form.name),
+    }
 }
 
 /// How directions are drawn from a form.
@@ -184,7 +210,7 @@ fn predicate(name: &str, forms: &[(u32, &Form)], holds: impl Fn(&Form) -> bool) 
 
 /// A switch over the kind of `material`. There is no other kind in the kernel than those of `cases`, so
 /// that the last may be the default; without any, it is what `none` says.
-fn dispatch(material: &str, mut cases: Vec<(u32, String)>, none: &str) -> String {
+pub(super) fn dispatch(material: &str, mut cases: Vec<(u32, String)>, none: &str) -> String {
     // Alike ones together.
     let Some((_, last)) = cases.pop() else {
         return format!("{none}\n");

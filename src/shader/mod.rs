@@ -5,6 +5,7 @@
 mod baked;
 mod binding;
 mod bsdf;
+mod mixes;
 mod names;
 mod sources;
 pub mod steps;
@@ -21,6 +22,8 @@ use crate::bvh;
 use crate::effects::{Effect, Effects, Role};
 use crate::error::{Error, Result};
 use crate::gpu::layout::{SKY_TABLE_WIDTH, anchored_spheres};
+use crate::gpu::measured::MEASURED_WIDTH;
+use crate::gpu::tables::SceneTables;
 use crate::gpu::textures::{IMAGE_WIDTH, TextureTable};
 use crate::materials;
 use crate::placement::{Medium, Placement};
@@ -272,6 +275,17 @@ fn config(scene: &Scene, placement: &Placement, effects: &Effects) -> String {
             table.patterns().len().max(1),
             table.images().len().max(1)
         );
+    }
+    if effects.has_mixes() {
+        let mixes = SceneTables::new(scene, placement).mixes;
+        text += &format!(
+            "const PART_COUNT: u32 = {}u;\nconst PART_WEIGHT_COUNT: u32 = {}u;\n",
+            mixes.parts().max(1),
+            mixes.weights().len().max(1)
+        );
+    }
+    if effects.has_tables() {
+        text += &format!("const MEASURED_WIDTH: u32 = {MEASURED_WIDTH}u;\n");
     }
     text += &environment(scene, placement, effects);
     if effects.has(Effect::Lights) {

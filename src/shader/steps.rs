@@ -14,6 +14,7 @@
 
 use crate::effects::{Effect, Effects};
 use crate::materials::schema::MOST_OCTAVES;
+use crate::materials::texturable::WEIGHT;
 use crate::placement::Placement;
 
 /// The most loop iterations that an invocation is to make in one dispatch: below the 65535 after which
@@ -35,7 +36,7 @@ pub struct Loop {
 }
 
 /// All loops of the path tracer's kernel.
-pub const LOOPS: [Loop; 10] = [
+pub const LOOPS: [Loop; 17] = [
     // Over vertices.
     Loop {
         function: "render",
@@ -87,22 +88,73 @@ pub const LOOPS: [Loop; 10] = [
     Loop {
         function: "flake_at",
         used: Effects::has_flakes,
-        at_vertex: |_, effects| {
+        at_vertex: |placement, effects| {
             // By `sample`, with the lecture's integrator by `share` and `evaluate`; and for a light.
             let lecture = usize::from(effects.has(Effect::Lecture));
-            (rays(effects) + lecture) * (27 + 1)
+            (rays(effects) + lecture + parts_visited(placement, effects)) * (27 + 1)
         },
     },
     // Over the octaves of a noise.
     Loop {
         function: "noise_value",
         used: |effects| effects.has(Effect::TextureNoise),
-        at_vertex: |_, effects| {
-            // Each key once, and what a light emits.
-            let lookups =
-                effects.textured_keys().count() + usize::from(effects.has(Effect::Lights));
+        at_vertex: |placement, effects| {
+            // Each key once, and what a light emits; those of a mix's parts as often as they are visited, with its weights.
+            let keys = effects.textured_keys().count();
+            let parts = keys * (parts_visited(placement, effects) + 1);
+            let weights = visits(effects) * placement.mixed[1];
+            let mixed = usize::from(effects.has_mixes()) * (parts + weights);
+            let lookups = keys + mixed + usize::from(effects.has(Effect::Lights));
             lookups * (MOST_OCTAVES as usize + 1)
         },
+    },
+    // Over the parts of a mix: which has the delta lobe that is drawn, or which is drawn from,
+    Loop {
+        function: "choose_part",
+        used: |effects| effects.mixes_deltas(),
+        at_vertex: |placement, _| placement.mixed[0] + 1,
+    },
+    Loop {
+        function: "choose_part",
+        used: |effects| draws_from_parts(effects),
+        at_vertex: |placement, _| placement.mixed[0] + 1,
+    },
+    // what all say of the direction that one has drawn,
+    Loop {
+        function: "sample_mix",
+        used: Effects::has_mixes,
+        at_vertex: |placement, _| placement.mixed[0] + 1,
+    },
+    // what they say of one, to a light or drawn uniformly,
+    Loop {
+        function: "evaluate_mix",
+        used: |effects| {
+            effects.has_mixes() && (effects.samples_light() || effects.has(Effect::Lecture))
+        },
+        at_vertex: |placement, effects| {
+            let lecture = usize::from(effects.has(Effect::Lecture));
+            (lecture + rays(effects) - 1) * (placement.mixed[0].max(1) + 1)
+        },
+    },
+    // the probability of their delta lobes,
+    Loop {
+        function: "share_mix",
+        used: |effects| effects.mixes_deltas() && effects.has(Effect::Lecture),
+        at_vertex: |placement, _| placement.mixed[0] + 1,
+    },
+    // and their colour.
+    Loop {
+        function: "color_at",
+        used: |effects| {
+            effects.has_mixes() && effects.has_textures() && effects.has(Effect::Features)
+        },
+        at_vertex: |placement, _| placement.mixed[0] + 1,
+    },
+    // Over the weights of a part that are textures.
+    Loop {
+        function: "part_weight",
+        used: |effects| effects.textured_keys().any(|key| key == WEIGHT),
+        at_vertex: |placement, effects| visits(effects) * (placement.mixed[0] + placement.mixed[1]),
     },
     // Over the lights that are weighed.
     Loop {
@@ -111,6 +163,33 @@ pub const LOOPS: [Loop; 10] = [
         at_vertex: |placement, _| placement.lights.table.len().max(1) + 1,
     },
 ];
+
+/// Whether directions are drawn from one of a mix's parts: by the lecture's integrator only where it is a delta lobe.
+fn draws_from_parts(effects: &Effects) -> bool {
+    effects.has_mixes() && (effects.mixes_deltas() || !effects.has(Effect::Lecture))
+}
+
+/// How often all parts of a mix are gone through at a vertex: by the loops over them.
+fn visits(effects: &Effects) -> usize {
+    let often = [
+        effects.has_mixes(),
+        effects.mixes_deltas(),
+        draws_from_parts(effects),
+        effects.has(Effect::Lecture),
+        effects.has(Effect::Lecture) && effects.mixes_deltas(),
+        effects.samples_light(),
+        effects.has(Effect::Features),
+    ];
+    often.into_iter().filter(|loops| *loops).count()
+}
+
+/// The parts that are gone through together.
+fn parts_visited(placement: &Placement, effects: &Effects) -> usize {
+    match effects.has_mixes() {
+        true => visits(effects) * placement.mixed[0],
+        false => 0,
+    }
+}
 
 /// Rays that are traced at a vertex: with light sampling also one to a light.
 fn rays(effects: &Effects) -> usize {

@@ -35,6 +35,7 @@ fn colours_and_roughnesses_may_be_textures() {
             "disney.roughness",
             "disney.specular",
             "mirror.reflectance",
+            "mix.weight",
             "nylon.diffuse",
             "reflective.albedo",
             "reflective.specular",

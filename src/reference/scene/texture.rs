@@ -7,6 +7,7 @@ use glam::{DVec2, DVec3};
 
 use crate::materials::MaterialKind;
 use crate::materials::lattice::LatticePoint;
+use crate::materials::mix::Weight;
 use crate::materials::texturable::EMISSION;
 use crate::reference::core::random::mix_bits;
 use crate::scene::Material;
@@ -116,9 +117,25 @@ pub fn kind_at<'a>(material: &'a Material, point: &TexturePoint) -> Cow<'a, Mate
     let scattering = material.textures.iter().filter(|t| t.key.key != EMISSION);
     let values = scattering.map(|t| parameter(t.key, texture_value(&t.texture, point)));
     let values: Vec<_> = values.collect();
-    match values[..] {
+    let kind = match values[..] {
         [] => Cow::Borrowed(&material.kind),
         _ => Cow::Owned(material.kind.with(&values)),
+    };
+    match &*kind {
+        MaterialKind::Mix(mix) => {
+            let mut mix = mix.clone();
+            for part in &mut mix.parts {
+                part.material.kind = kind_at(&part.material, point).into_owned();
+                part.material.textures.clear();
+                for factor in &mut part.inner {
+                    if let Weight::Texture(texture) = &factor.weight {
+                        factor.weight = Weight::Number(texture_value(texture, point).x);
+                    }
+                }
+            }
+            Cow::Owned(mix.into())
+        }
+        _ => kind,
     }
 }
 

@@ -1,0 +1,79 @@
+//! All that a kernel's records of materials refer to by numbers.
+
+use crate::gpu::layout::MaterialRecord;
+use crate::gpu::measured::MeasuredTables;
+use crate::gpu::mix::MixTable;
+use crate::gpu::textures::{Numbers, TextureTable};
+use crate::materials::measured::START;
+use crate::materials::mix::PARTS;
+use crate::placement::Placement;
+use crate::scene::{Material, Scene};
+
+/// Textures, tables of measured materials and parts of mixes.
+#[derive(Clone, Debug)]
+pub struct SceneTables {
+    /// Textures.
+    pub textures: TextureTable,
+    /// Tables of measured materials.
+    pub measured: MeasuredTables,
+    /// Parts of mixes.
+    pub mixes: MixTable,
+}
+
+impl SceneTables {
+    /// Those of `scene` as it is placed.
+    #[must_use]
+    pub fn new(scene: &Scene, placement: &Placement) -> Self {
+        let textures = TextureTable::new(scene, placement);
+        let measured = MeasuredTables::new(scene, placement);
+        let mixes = MixTable::new(scene, placement, &textures, &measured);
+        Self {
+            textures,
+            measured,
+            mixes,
+        }
+    }
+
+    /// The record of a material of the scene, for spheres about their centres.
+    #[must_use]
+    pub fn of_material(
+        &self,
+        index: usize,
+        scene: &Scene,
+        placement: &Placement,
+    ) -> MaterialRecord {
+        let material = &scene.materials[index];
+        let record = MaterialRecord::new(material, placement.radiance_scale, placement.scale);
+        let numbers = self.textures.of_material(index);
+        self.complete(record, material, numbers, self.mixes.of_material(index))
+    }
+
+    /// The record of the material of a sphere of the placement.
+    #[must_use]
+    pub fn of_sphere(&self, index: usize, scene: &Scene, placement: &Placement) -> MaterialRecord {
+        let sphere = &placement.spheres[index];
+        let material = &scene.materials[sphere.material];
+        let record = MaterialRecord::of_sphere(material, sphere, placement);
+        let numbers = self.textures.of_sphere(index, placement);
+        self.complete(
+            record,
+            material,
+            numbers,
+            self.mixes.of_sphere(index, placement),
+        )
+    }
+
+    fn complete(
+        &self,
+        record: MaterialRecord,
+        material: &Material,
+        numbers: &Numbers,
+        [first, end]: [u32; 2],
+    ) -> MaterialRecord {
+        record
+            .with_word(START, self.measured.start(&material.kind))
+            .with_word(PARTS[0], first)
+            .with_word(PARTS[1], end)
+            .with_textures(material, numbers)
+    }
+}
