@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::{Effect, Row};
-use crate::materials::{Form, forms, mix};
+use crate::materials::{Form, forms, measured, mix};
 
 /// The forms of materials that are `wanted`.
 pub(super) fn forms_that(wanted: impl Fn(&Form) -> bool) -> Vec<Effect> {
@@ -33,6 +33,8 @@ pub(super) fn rows() -> Vec<Row> {
                     "sample_part",
                     "evaluate_part",
                 ])
+        } else if measured::is_tabled(form) {
+            row.marks(["MEASURED_WIDTH"])
         } else {
             row
         }

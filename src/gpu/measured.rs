@@ -25,8 +25,9 @@ impl MeasuredTables {
     pub fn new(scene: &Scene, placement: &Placement) -> Self {
         let mut all = Self::default();
         let used: BTreeSet<usize> = placement.spheres.iter().map(|s| s.material).collect();
-        for index in used {
-            let kind = &scene.materials[index].kind;
+        let materials = scene.materials.iter().enumerate();
+        for (_, material) in materials.filter(|(index, _)| used.contains(index)) {
+            let kind = &material.kind;
             let parts = kind.parts().iter().map(|part| &part.material.kind);
             for table in std::iter::once(kind)
                 .chain(parts)

@@ -86,7 +86,10 @@ fn materials_are_what_their_textures_say() {
         if let Some(evaluated) = evaluated {
             evaluated.agreement.assert_holds(evaluated.cases);
         }
-        // Companion: without its textures it is another material.
+        // Companion: without its textures it is another material, unless no key of it may be one.
+        if kind.form().texturable().next().is_none() {
+            continue;
+        }
         let (drawn, evaluated) = off(&plain, subject);
         let fails =
             drawn.agreement.any_fails() || evaluated.is_some_and(|e| e.agreement.any_fails());
