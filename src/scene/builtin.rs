@@ -81,6 +81,11 @@ pub const GALLERY: &[Builtin] = &[
         text: include_str!("../../scenes/prism.toml"),
     },
     Builtin {
+        name: "mix",
+        description: "mixes of materials: rust on iron, gold on lacquer, dust on a mirror, dirt and lichen on a car's paint",
+        text: include_str!("../../scenes/mix.toml"),
+    },
+    Builtin {
         name: "motion",
         description: "balls that roll, fall and fly, and a lamp that does, while the shutter is open",
         text: include_str!("../../scenes/motion.toml"),

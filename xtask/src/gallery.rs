@@ -59,12 +59,12 @@ const PICTURES: [Picture; 12] = [
     },
     Picture {
         name: "mix",
-        command: "scenes/mix.toml --size 480x300 --spp 512",
+        command: "mix --size 480x300 --spp 512",
         text: "Mixtures of two materials, by a number and by textures.",
     },
     Picture {
         name: "motion",
-        command: "scenes/motion.toml --size 480x300 --spp 512",
+        command: "motion --size 480x300 --spp 512",
         text: "Balls that move while the shutter is open.",
     },
     Picture {
