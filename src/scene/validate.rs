@@ -9,7 +9,7 @@ use toml::de::DeTable;
 
 use super::file::{CameraTable, HandednessName, MaterialTable, SceneFile, SphereTable};
 use super::load::{Parsed, Place};
-use super::motion::Fault;
+use super::motion::{check_motion, shutter};
 use super::particles;
 use super::report::{Problem, Report, SHOWN};
 use super::suggest::{list, nearest};
@@ -216,7 +216,7 @@ pub(super) fn scene(
         spheres,
     };
     if report.errors.is_empty() {
-        motion(&scene, &file.camera, &file.sphere, report);
+        check_motion(&scene, &file.camera, &file.sphere, report);
     }
     if !report.errors.is_empty() {
         return None;
@@ -333,53 +333,6 @@ fn camera(table: &CameraTable, report: &mut Report) -> Option<Camera> {
         focus_distance: focus_distance
             .map_or_else(|| (look_at - position).length(), |d| *d.get_ref()),
     })
-}
-
-/// When the shutter opens and closes.
-fn shutter(table: &CameraTable, report: &mut Report) -> [f64; 2] {
-    let Some(shutter) = &table.shutter else {
-        return [0.0; 2];
-    };
-    let [opens, closes] = *shutter.get_ref();
-    if opens > closes {
-        let problem = Problem::new(shutter.span(), "the `shutter` closes before it opens", "");
-        report
-            .errors
-            .push(problem.help(format!("`shutter = [{closes:?}, {opens:?}]` opens first")));
-    }
-    [opens, closes]
-}
-
-/// Reports the spheres of the file, which are the first ones of `scene`, that cannot move as they do, and those that
-/// were probably meant to.
-fn motion(scene: &Scene, camera: &CameraTable, spheres: &[SphereTable], report: &mut Report) {
-    let mut first = None;
-    for (sphere, table) in std::iter::zip(&scene.spheres, spheres) {
-        let Some(velocity) = &table.velocity else {
-            continue;
-        };
-        first = first.or((*velocity.get_ref() != [0.0; 3]).then_some(velocity));
-        let Some(fault) = Fault::of(scene, sphere) else {
-            continue;
-        };
-        let message = format!("this sphere {}", fault.what());
-        let problem = Problem::new(velocity.span(), message, "").help(fault.help());
-        let other = match fault {
-            Fault::OverCamera => Some((camera.position.span(), "the camera")),
-            _ => camera.shutter.as_ref().map(|s| (s.span(), "the shutter")),
-        };
-        report.errors.push(match other {
-            Some((span, label)) => problem.also(span, label),
-            None => problem,
-        });
-    }
-    if let Some(velocity) = first.filter(|_| camera.shutter.is_none()) {
-        let message = "`velocity` moves nothing: the camera has no `shutter`";
-        let problem = Problem::new(velocity.span(), message, "");
-        report.warnings.push(
-            problem.help("`shutter = [0.0, 1.0]` in `[camera]` is open from time 0 to time 1"),
-        );
-    }
 }
 
 /// The vector's direction; `None` if it has none. Lengths whose square is no f64 are fine.
