@@ -29,7 +29,7 @@ const LONG_FORMS: &str = "GPU_TRACE_TEST_ALL";
 /// studies, to which a GPU is one like another; and those of light transport, whose formulas are asked
 /// on every driver by the others, one by one (`functions`, `materials`, `check`) and in whole images
 /// (`agreement`, `hazards`). All other files of `tests/` run on every driver.
-const ONCE: [&str; 33] = [
+const ONCE: [&str; 35] = [
     "albedo_variance",
     "car_paint",
     "choice",
@@ -53,6 +53,8 @@ const ONCE: [&str; 33] = [
     "job",
     "ledger",
     "material_keys",
+    "measured",
+    "mix",
     "naive",
     "output",
     "particles",
