@@ -31,14 +31,14 @@ struct Picture {
 const PICTURES: [Picture; 12] = [
     Picture {
         name: "everything",
-        command: "scenes/everything.toml --size 640x400 --spp 1024",
+        command: "scenes/everything.toml --size 640x400 --spp 512",
         text: "One scene with everything: rough and smooth metals, car paint with flakes under a coat, cloth, nylon, \
                Disney's and Ashikhmin's plastic, glass that absorbs, has a bubble of air in it, is frosted or disperses \
                light, an image, a checker and noise for textures, a lamp, a sky, a lens.",
     },
     Picture {
         name: "car-paint",
-        command: "car-paint --size 600x250 --spp 1024",
+        command: "car-paint --size 600x250 --spp 512",
         text: "Measured silver, and three paints with flakes of other sizes, densities and spreads under a clear coat \
                (docs/car-paint.md).",
     },
@@ -49,7 +49,7 @@ const PICTURES: [Picture; 12] = [
     },
     Picture {
         name: "prism",
-        command: "prism --size 400x300 --spp 8192",
+        command: "prism --size 400x300 --spp 2048",
         text: "Glass whose index depends on the wavelength: the light that a lamp sends through it falls apart.",
     },
     Picture {
@@ -69,7 +69,7 @@ const PICTURES: [Picture; 12] = [
     },
     Picture {
         name: "sky",
-        command: "scenes/sky.toml --size 480x300 --spp 2048",
+        command: "scenes/sky.toml --size 480x300 --spp 1024",
         text: "Light from an image all around, whose sun is a few texels: it is sampled as a lamp is.",
     },
     Picture {
