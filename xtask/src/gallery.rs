@@ -31,10 +31,10 @@ struct Picture {
 const PICTURES: [Picture; 12] = [
     Picture {
         name: "everything",
-        command: "scenes/everything.toml --size 640x400 --spp 512",
-        text: "One scene with everything: rough and smooth metals, car paint with flakes under a coat, cloth, nylon, \
+        command: "scenes/everything.toml --size 480x300 --spp 128",
+        text: "Nearly everything in one scene: rough and smooth metals, car paint with flakes under a coat, cloth, nylon, \
                Disney's and Ashikhmin's plastic, glass that absorbs, has a bubble of air in it, is frosted or disperses \
-               light, an image, a checker and noise for textures, a lamp, a sky, a lens.",
+               light, an image, a checker and noise for textures, rust mixed into copper, a ball that flies past, a lamp, a sky, a lens.",
     },
     Picture {
         name: "car-paint",
@@ -59,12 +59,12 @@ const PICTURES: [Picture; 12] = [
     },
     Picture {
         name: "mix",
-        command: "mix --size 480x300 --spp 512",
+        command: "mix --size 480x300 --spp 128",
         text: "Mixtures of two materials, by a number and by textures.",
     },
     Picture {
         name: "motion",
-        command: "motion --size 480x300 --spp 512",
+        command: "motion --size 480x300 --spp 256",
         text: "Balls that move while the shutter is open.",
     },
     Picture {
