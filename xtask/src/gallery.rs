@@ -55,7 +55,7 @@ const PICTURES: [Picture; 12] = [
     Picture {
         name: "textures",
         command: "scenes/textures.toml --size 480x300 --spp 512",
-        text: "An image on a ball, a checker on a ground of radius 1000, noise in a colour and in the roughness of copper.",
+        text: "An image on a ball, a checker on a ground of radius 1e6, noise in a colour and in the roughness of copper.",
     },
     Picture {
         name: "mix",
