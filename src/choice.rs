@@ -182,14 +182,20 @@ fn counts(job: &Job) -> [f64; 2] {
         settings,
     };
     let pixels = settings.crop.pixels() as u32;
-    let mut sums = [0.0; 2];
+    let spheres = job.scene().spheres.len() as f64;
+    let (mut sums, mut traced) = ([0.0; 2], 0.0);
     for i in 0..COUNTED {
+        // Paths that never end, as without roulette, are few enough to say that a pilot would take too long.
+        if (sums[0] + sums[1]) * spheres > TESTS {
+            break;
+        }
+        traced += 1.0;
         let pixel = (u64::from(i) * u64::from(pixels) / u64::from(COUNTED)) as u32;
         let path = tracer.trace([pixel % settings.width, pixel / settings.width], 0);
         sums[0] += f64::from(path.rays - path.shadow_rays);
         sums[1] += f64::from(path.connections);
     }
-    sums.map(|sum| sum / f64::from(COUNTED))
+    sums.map(|sum| sum / traced)
 }
 
 fn relative_variance(film: &Film) -> f64 {

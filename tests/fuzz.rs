@@ -1250,15 +1250,16 @@ struct Render {
     render: RenderArgs,
 }
 
-/// A scene with members that options meet.
-fn room() -> Scene {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/lecture.toml");
+/// A scene with members that options meet, and without lamps: for each set of words a pilot would choose the estimator.
+fn ball() -> Scene {
+    let path =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/tests/white-furnace-diffuse.toml");
     load_file(&path).expect("a scene").scene
 }
 
 #[test]
 fn no_words_upset_the_command_line() {
-    let scene = room();
+    let scene = ball();
     let mut seeds: Vec<Vec<u8>> = VALUES
         .iter()
         .chain(NUMBERS)
