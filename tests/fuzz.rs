@@ -1126,10 +1126,10 @@ fn no_bytes_upset_the_particle_readers() {
 
 /// Films of a few pixels, without and with layers.
 fn films() -> Vec<Vec<u8>> {
-    let room = room();
+    let ball = ball();
     [false, true]
         .map(|classes| {
-            let mut settings = Settings::for_scene(&room);
+            let mut settings = Settings::for_scene(&ball);
             (settings.crop.width, settings.crop.height) = (3, 2);
             (settings.samples, settings.classes) = (0..16, classes);
             let rect = settings.crop;
