@@ -14,7 +14,7 @@ use crate::reference::path::PathTracer;
 use crate::reference::renderer::ReferenceRenderer;
 use crate::render::render_quietly;
 use crate::scene::Scene;
-use crate::settings::{Integrator, Rect, Settings};
+use crate::settings::{GeometryChoice, Integrator, Rect, Settings};
 use crate::variance::VarianceClass;
 
 /// The estimators to choose from, the one that is taken in doubt first.
@@ -87,23 +87,23 @@ impl Choice {
     }
 }
 
-/// Chooses for a scene as `settings` would render it: a function of the scene, the image's size, the sampler and what
-/// ends paths.
+/// Chooses for a scene as `settings` would render it: a function of the scene, the image's size, the sampler, and how paths
+/// leave surfaces and where they end. Not of the geometry's form, which changes no image.
 ///
 /// # Errors
 /// Those of [`prepare`], and of the reference's threads.
 pub fn choose(scene: &Scene, settings: &Settings) -> Result<Choice> {
+    let spheres = scene.spheres.len() as f64;
+    let affordable = |rays: f64| TESTS / (spheres * rays * (2 * SAMPLES) as f64);
+    let too_large = "there are more spheres than a pilot can look at";
+    // Before anything is placed, which takes seconds where spheres are many.
+    if affordable(1.0) < PIXELS[0] {
+        return Ok(Choice::without_pilot(too_large));
+    }
     let job = |integrator, pixels: f64| prepare(scene, &pilot(settings, integrator, pixels));
     let whole = job(CANDIDATES[0], PIXELS[1])?;
     if !whole.effects().samples_light() {
         return Ok(Choice::without_pilot("nothing here is sampled as a light"));
-    }
-    let spheres = scene.spheres.len() as f64;
-    let affordable = |rays: f64| TESTS / (spheres * rays * (2 * SAMPLES) as f64);
-    let too_large = "there are more spheres than a pilot can look at";
-    // Before the first path.
-    if affordable(1.0) < PIXELS[0] {
-        return Ok(Choice::without_pilot(too_large));
     }
     let [rays, connections] = counts(&whole);
     let pixels = affordable(rays + connections).min(PIXELS[1]);
@@ -163,6 +163,7 @@ fn pilot(settings: &Settings, integrator: Integrator, pixels: f64) -> Settings {
         samples: 0..SAMPLES,
         seed: 0,
         integrator,
+        geometry: GeometryChoice::Auto,
         view: None,
         adaptive: false,
         classes: false,

@@ -5,7 +5,7 @@ use crate::common::{render_gpu, scene, scene_file};
 use gpu_trace::choice::{Choice, choose};
 use gpu_trace::film::Estimate;
 use gpu_trace::scene::Scene;
-use gpu_trace::settings::{Integrator, Rect, Settings};
+use gpu_trace::settings::{GeometryChoice, Integrator, Rect, Settings};
 
 fn chosen(scene: &Scene) -> Choice {
     choose(scene, &Settings::for_scene(scene)).unwrap_or_else(|e| panic!("{e}"))
@@ -52,6 +52,7 @@ fn a_choice_is_a_function_of_the_scene_and_the_size() {
         },
         samples: 1024..2048,
         classes: true,
+        geometry: GeometryChoice::List,
         ..settings.clone()
     };
     let found = |settings| choose(&scene, settings).expect("a choice");

@@ -2,7 +2,6 @@
 
 use super::surfaces::forms_that;
 use super::{Effect, Row};
-use crate::materials::mix;
 use crate::materials::texturable::{EMISSION, WEIGHT, flag, texture_member, textured_keys};
 use crate::scene::{Material, Texture};
 
@@ -80,12 +79,17 @@ pub(super) fn rows() -> Vec<Row> {
             EMISSION => row
                 .needs([Effect::Emission])
                 .marks(["emission_at", "radiance_seen"]),
-            WEIGHT => row.needs(forms_that(mix::is_mix)).marks([
-                "data::PartWeight",
-                "SceneData::part_weights",
-                "PART_WEIGHT_COUNT",
-            ]),
-            _ => row.needs(forms_that(|form| form.texturable().any(|t| t.key == *key))),
+            name => {
+                let row = row.needs(forms_that(|form| form.texturable().any(|t| t.key == name)));
+                match name {
+                    WEIGHT => row.marks([
+                        "data::PartWeight",
+                        "SceneData::part_weights",
+                        "PART_WEIGHT_COUNT",
+                    ]),
+                    _ => row,
+                }
+            }
         }
     });
     kinds.into_iter().chain(each).collect()

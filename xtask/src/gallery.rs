@@ -70,7 +70,7 @@ const PICTURES: [Picture; 12] = [
     Picture {
         name: "sky",
         command: "scenes/sky.toml --size 480x300 --spp 1024",
-        text: "Light from an image all around, whose sun is a few texels: it is sampled as a lamp is.",
+        text: "Light from an image all around, whose sun is one texel: it is sampled as a lamp is.",
     },
     Picture {
         name: "disney",
@@ -138,7 +138,7 @@ fn ask(words: &str) -> Result<String, String> {
 
 fn page() -> Result<String, String> {
     let mut page = String::from(
-        "# Gallery\n\nA scene for each material and effect, by the command beside it, with the line that it prints and what \
+        "# Gallery\n\nA scene for most materials and effects, by the command beside it, with the line that it prints and what \
          its kernel holds. What one of these costs is in [effects.md](effects.md); `gpu-trace effects SCENE --measure` says \
          it for a scene. `cargo xtask gallery` made this page.\n",
     );
