@@ -177,11 +177,7 @@ fn pilot(settings: &Settings, integrator: Integrator, pixels: f64) -> Settings {
 /// Rays and connections of a path, in the mean over paths all over the image.
 fn counts(job: &Job) -> [f64; 2] {
     let settings = job.settings();
-    let tracer = PathTracer {
-        scene: job.scene(),
-        placement: job.placement(),
-        settings,
-    };
+    let tracer = PathTracer::new(job.scene(), job.placement(), settings);
     let pixels = settings.crop.pixels() as u32;
     let spheres = job.scene().spheres.len() as f64;
     let (mut sums, mut traced) = ([0.0; 2], 0.0);

@@ -15,6 +15,9 @@ pub struct Claims {
     /// other and, in a window, alike: their spread estimates the variance of the mean without bias. So it
     /// is with every estimator of today; one that learns from its samples has no such batches.
     pub independent_batches: bool,
+    /// Pixels are independent of each other, so that what is known of each one's error tells that of their mean. Those
+    /// of the radiance cache have the noise of the same values in them, batch by batch.
+    pub independent_pixels: bool,
     /// A sample's variance is finite, as far as is known before anything is rendered.
     pub finite_variance: bool,
     /// The samples of a pixel have the same bits whatever else is rendered with them: crops and dispatches
@@ -24,13 +27,14 @@ pub struct Claims {
 }
 
 impl Claims {
-    /// What is claimed with `settings` where samples have a variance of this class.
+    /// What is claimed with `settings` where samples have a variance of this class; `cache`: by the radiance cache.
     #[must_use]
-    pub fn of(settings: &Settings, variance: VarianceClass) -> Self {
+    pub fn of(settings: &Settings, variance: VarianceClass, cache: bool) -> Self {
         let fixed = settings.error.is_none() && settings.time.is_none();
         Self {
             unbiased: fixed && settings.offset == Offset::Exact,
             independent_batches: true,
+            independent_pixels: !cache,
             finite_variance: variance != VarianceClass::Infinite,
             any_split_same_bits: fixed && !settings.adaptive,
         }

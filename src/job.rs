@@ -4,12 +4,14 @@
 //! compared that a check refuses. What only a device or the memory can tell is left to the
 //! [backend](crate::backend).
 
+use crate::cells::{Cells, obstacle};
 use crate::claims::Claims;
 use crate::effects::{BAKED_MOST, Effect, Effects};
 use crate::error::{Error, Result};
 use crate::film::PILOT_SAMPLES;
 use crate::placement::media::MAX_LEVELS;
 use crate::placement::{Placement, Side};
+use crate::reference::survey::survey;
 use crate::scene::motion::Fault;
 use crate::scene::{MAX_BOUNCES, MAX_SIDE, MAX_SPP, Scene};
 use crate::settings::{GeometryChoice, Integrator, Offset, Settings, TERMINATIONS, View};
@@ -43,6 +45,13 @@ pub fn prepare(scene: &Scene, settings: &Settings) -> Result<Job> {
     check_lens(scene, &placement)?;
     let effects = Effects::derive(scene, &placement, settings);
     check_view(settings, &effects)?;
+    let placement = match effects.has(Effect::RadianceCache) {
+        true => {
+            let cells = survey(scene, &placement, settings);
+            placement.with_cells(cells)
+        }
+        false => placement,
+    };
     Ok(Job {
         effects,
         variance: variance_class(scene, &placement, settings),
@@ -77,6 +86,20 @@ impl Job {
         &self.effects
     }
 
+    /// The cells of the radiance cache, if it is used.
+    #[must_use]
+    pub fn cells(&self) -> Option<&Cells> {
+        self.placement.cells().map(AsRef::as_ref)
+    }
+
+    /// Why there is no radiance cache, where one is asked for.
+    #[must_use]
+    pub fn cache_obstacle(&self) -> Option<&'static str> {
+        let is_asked_for = self.settings.radiance_cache && self.cells().is_none();
+        let why = || obstacle(&self.scene, &self.placement, &self.settings);
+        is_asked_for.then(why).flatten()
+    }
+
     /// What is known of a sample's variance.
     #[must_use]
     pub fn variance(&self) -> &VarianceReport {
@@ -86,7 +109,7 @@ impl Job {
     /// What its estimator claims.
     #[must_use]
     pub fn claims(&self) -> Claims {
-        Claims::of(&self.settings, self.variance.class)
+        Claims::of(&self.settings, self.variance.class, self.cells().is_some())
     }
 
     /// The same with effects in the kernel that nothing asks for, to measure what they cost; `why` is the reason

@@ -31,6 +31,7 @@
 
 pub mod backend;
 pub mod bvh;
+pub mod cells;
 pub mod check;
 pub mod choice;
 pub mod claims;

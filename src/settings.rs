@@ -40,6 +40,9 @@ pub struct Settings {
     pub light_sampling: LightSampling,
     /// How the random numbers of samples are placed.
     pub sampler: Sampler,
+    /// Whether diffuse surfaces that paths come to from diffuse ones reflect by values of cells, drawn anew for every
+    /// batch of samples and corrected without bias, where nothing [stands against it](crate::cells::obstacle).
+    pub radiance_cache: bool,
     /// Whether paths end by Russian roulette on their throughput. The lecture's estimator has its own, and
     /// does not ask.
     pub roulette: bool,
@@ -86,6 +89,7 @@ impl Settings {
             integrator: Integrator::Path,
             light_sampling: LightSampling::default(),
             sampler: Sampler::default(),
+            radiance_cache: false,
             roulette: true,
             geometry: GeometryChoice::Auto,
             view: None,
@@ -354,6 +358,12 @@ impl std::str::FromStr for Offset {
 pub fn stream_words(seed: u64, sample_high: u32) -> [u32; 2] {
     let both = split_mix(split_mix(seed) ^ u64::from(sample_high));
     [both as u32, (both >> 32) as u32]
+}
+
+/// The same two words for the paths of the radiance cache's pilots: those of samples that no image has.
+#[must_use]
+pub fn pilot_words(seed: u64, sample_high: u32) -> [u32; 2] {
+    stream_words(seed, sample_high | 1 << 31)
 }
 
 /// A bijection in which every bit of `x` reaches every bit of the result: SplitMix64 of Steele, Lea

@@ -35,6 +35,7 @@ fn pilot(rect: Rect, sample: impl Fn(u32, u32) -> (f64, f64)) -> Film {
         }
     };
     film.add(&Window {
+        image: Vec::new(),
         rect,
         samples: 0..64,
         batch: 4,

@@ -98,6 +98,24 @@ fn every_scene_agrees_with_the_reference() {
 }
 
 #[test]
+fn the_radiance_cache_agrees_with_the_reference() {
+    let names = [
+        "lecture",
+        "glass",
+        "lecture-reflective",
+        "tests/three-lamps",
+    ];
+    check(names.into_iter().map(|name| {
+        let scene = scene_file(format!("scenes/{name}.toml"));
+        let settings = Settings {
+            radiance_cache: true,
+            ..settings(&scene, 48, 48, 64)
+        };
+        (format!("{name}, radiance cache"), scene, settings)
+    }));
+}
+
+#[test]
 fn other_kernels_agree_with_the_reference() {
     let names = [
         "lecture",

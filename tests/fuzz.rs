@@ -314,6 +314,7 @@ const OPTIONS: &[&str] = &[
     "--integrator",
     "--sampler",
     "--max-bounces",
+    "--radiance-cache",
     "--roulette",
     "--termination",
     "--backend",
@@ -1135,6 +1136,7 @@ fn films() -> Vec<Vec<u8>> {
             let rect = settings.crop;
             let mut film = Film::new(rect);
             film.add(&Window {
+                image: Vec::new(),
                 rect,
                 samples: 0..16,
                 batch: 4,

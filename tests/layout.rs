@@ -6,8 +6,8 @@ use crate::common::scene;
 use glam::DVec3;
 use gpu_trace::effects::Effects;
 use gpu_trace::gpu::layout::{
-    CameraRecord, CountersRecord, DispatchRecord, LightRecord, MaterialRecord, PoleRecord,
-    SphereRecord,
+    CameraRecord, ChartRecord, CountersRecord, DispatchRecord, LightRecord, MaterialRecord,
+    PilotRecord, PoleRecord, SphereRecord,
 };
 use gpu_trace::gpu::probe::ShapeRecord;
 use gpu_trace::materials::dielectric::Index;
@@ -271,6 +271,32 @@ fn fixed_structs_agree() {
     });
     check("Counters", &counters, &kernel);
     check("Light", &light(), &kernel);
+}
+
+#[test]
+fn structs_of_the_radiance_cache_agree() {
+    let kernel = kernel(Stage::Path, &["list", "sobol", "diffuse", "radiance_cache"]);
+    let chart = host!(ChartRecord {
+        first,
+        side,
+        diffuse,
+        width,
+        across,
+        unused0,
+        down,
+        unused1,
+    });
+    check("Chart", &chart, &kernel);
+    let work = host!(PilotRecord {
+        stream,
+        batch,
+        begin,
+        end,
+        first_value,
+        samples,
+        unused,
+    });
+    check("PilotWork", &work, &kernel);
 }
 
 #[test]

@@ -313,6 +313,7 @@ fn a_window_cut_short_is_the_last() {
             // The second window.
             let end = if samples.start == 16 { 24 } else { samples.end };
             Ok(Window {
+                image: Vec::new(),
                 rect: RECT,
                 samples: samples.start..end,
                 batch: 4,

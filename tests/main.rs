@@ -57,6 +57,7 @@ mod powers;
 mod price;
 mod prices;
 mod projected;
+mod radiance_cache;
 mod references;
 mod reflective;
 mod rough_glass;

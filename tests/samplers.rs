@@ -102,11 +102,7 @@ fn companion_samples_of_a_scramble_are_not_independent() {
         // Of every other pixel, and of every other line.
         let (z, ratio) = bars(100, |seed| {
             let settings = small(&scene, sampler, 256, seed);
-            let tracer = PathTracer {
-                scene: &scene,
-                placement: &placement,
-                settings: &settings,
-            };
+            let tracer = PathTracer::new(&scene, &placement, &settings);
             (0..100)
                 .map(|i| single_samples(&tracer, [i % 10 * 2, i / 10 * 2]))
                 .collect()

@@ -226,6 +226,15 @@ pub struct RenderArgs {
         value_parser = choices::switch(),
         help_heading = "Light transport",
         hide_possible_values = true,
+        help = "Let diffuse surfaces reflect by values of cells, drawn anew for every scramble and corrected without bias [default: off]"
+    )]
+    pub radiance_cache: Option<bool>,
+    #[arg(
+        long,
+        value_name = "on|off",
+        value_parser = choices::switch(),
+        help_heading = "Light transport",
+        hide_possible_values = true,
         help = "End weak paths early by Russian roulette, without bias [default: on]"
     )]
     pub roulette: Option<bool>,
@@ -441,6 +450,7 @@ impl RenderArgs {
             max_bounces: self.max_bounces.unwrap_or(settings.max_bounces),
             integrator: integrator.with_termination(termination),
             light_sampling: self.light_sampling.unwrap_or_default(),
+            radiance_cache: self.radiance_cache == Some(true),
             roulette: !integrator.is_lecture() && self.roulette != Some(false),
             sampler: self.sampler,
             geometry: self.geometry,

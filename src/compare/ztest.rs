@@ -64,20 +64,23 @@ pub fn ztest(image: &Input, reference: &Input) -> Option<ZTest> {
     let width = image.picture.width as usize;
     let (mut values, mut untested, mut noisy) = (0, 0, 0);
     let (mut worst, mut squares) = ((0.0, 0), 0.0);
-    let (mut difference, mut variance) = ([0.0; 3], [0.0; 3]);
+    let mut difference = [0.0; 3];
+    // Of the sum over all pixels: of the image, of the reference, and of rounding.
+    let mut variance = [[0.0; 3]; 3];
     // |z| of each pixel's worst channel: the limit depends on how many values there are.
     let mut largest = Vec::with_capacity(image.picture.pixels.len());
     for index in 0..image.picture.pixels.len() {
         let mut here = 0.0f64;
         for channel in 0..3 {
-            let Some(Deviation { d, v, freedom }) = deviation(image, reference, index, channel)
-            else {
+            let Some(deviation) = deviation(image, reference, index, channel) else {
                 untested += 1;
                 continue;
             };
             values += 1;
+            let Deviation { d, parts, freedom } = deviation;
+            let v: f64 = parts.iter().sum();
             difference[channel] += d;
-            variance[channel] += v;
+            (0..3).for_each(|i| variance[channel][i] += parts[i]);
             // Without a difference there is nothing to explain, even if both are exactly 0.
             let t = if d == 0.0 { 0.0 } else { d.abs() / v.sqrt() };
             let z = as_normal(t, freedom);
@@ -93,9 +96,20 @@ pub fn ztest(image: &Input, reference: &Input) -> Option<ZTest> {
     }
     let limit = normal_limit(values.max(1));
     let pooled_limit = normal_limit(3);
-    let z = |c: usize| match difference[c] == 0.0 {
-        true => 0.0,
-        false => f64::abs(difference[c]) / f64::sqrt(variance[c]),
+    let z = |c: usize| {
+        let (d, pixels) = (f64::abs(difference[c]), image.picture.pixels.len());
+        if d == 0.0 {
+            return 0.0;
+        }
+        // Where pixels are not independent of each other, the file tells what their mean has.
+        let told = [image, reference].map(|input| Some((mean_stderr(input)?[c], freedom(input))));
+        let of = |told: Option<(f64, f64)>, independent: f64| match told {
+            Some((error, freedom)) => ((error * pixels as f64).powi(2), freedom),
+            None => (independent, f64::INFINITY),
+        };
+        let parts = [0, 1].map(|i| of(told[i], variance[c][i]));
+        let v = parts[0].0 + parts[1].0 + variance[c][2];
+        as_normal(d / v.sqrt(), welch(v, parts))
     };
     let pooled = [0, 1, 2].map(z).into_iter().fold(0.0, f64::max);
     Some(ZTest {
@@ -113,10 +127,11 @@ pub fn ztest(image: &Input, reference: &Input) -> Option<ZTest> {
     })
 }
 
-/// A difference, its variance, and that one's degrees of freedom.
+/// A difference, the parts of its variance, and that one's degrees of freedom.
 struct Deviation {
     d: f64,
-    v: f64,
+    /// Of the image, of the reference, and of rounding.
+    parts: [f64; 3],
     freedom: f64,
 }
 
@@ -139,18 +154,41 @@ fn deviation(image: &Input, reference: &Input, index: usize, channel: usize) -> 
     let (a, b) = (f64::from(a[channel]), f64::from(b[channel]));
     let (error_a, error_b) = (error(&image.stderr)?, error(&reference.stderr)?);
     let rounding = ROUNDING * a.abs().max(b.abs());
-    let v = error_a.powi(2) + error_b.powi(2) + rounding.powi(2);
-    // Welch and Satterthwaite; that of rounding is known.
-    let doubt = error_a.powi(4) / freedom(image) + error_b.powi(4) / freedom(reference);
+    let parts = [error_a, error_b, rounding].map(|error| error * error);
+    let freedom = welch(
+        parts.iter().sum(),
+        [(parts[0], freedom(image)), (parts[1], freedom(reference))],
+    );
     Some(Deviation {
         d: a - b,
-        v,
-        freedom: if doubt > 0.0 {
-            v * v / doubt
-        } else {
-            f64::INFINITY
-        },
+        parts,
+        freedom,
     })
+}
+
+/// The degrees of freedom of a variance `v`, parts of which have been estimated with so many (Welch 1947, Satterthwaite
+/// 1946); the rest is known.
+fn welch(v: f64, parts: [(f64, f64); 2]) -> f64 {
+    let doubt: f64 = parts.iter().map(|(v, freedom)| v * v / freedom).sum();
+    if doubt > 0.0 {
+        v * v / doubt
+    } else {
+        f64::INFINITY
+    }
+}
+
+/// The standard error of an image's mean, by channel, where its file tells: else pixels are independent of each other.
+fn mean_stderr(input: &Input) -> Option<[f64; 3]> {
+    let told = input.about.get("mean_stderr")?;
+    let numbers: Vec<f64> = told
+        .split_whitespace()
+        .map(|word| {
+            word.parse()
+                .ok()
+                .filter(|x| (0.0..f64::INFINITY).contains(x))
+        })
+        .collect::<Option<_>>()?;
+    numbers.try_into().ok()
 }
 
 /// The degrees of freedom of an image's standard errors; infinite if its file does not say.

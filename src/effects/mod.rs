@@ -100,6 +100,8 @@ pub enum Effect {
     Mis,
     /// Russian roulette on the throughput.
     Roulette,
+    /// Values of cells in the place of paths.
+    RadianceCache,
 }
 
 /// What asks for an effect.
@@ -482,6 +484,10 @@ impl Effects {
             ("mixed_textures", self.has_mixes() && self.has_textures()),
             ("weighed", self.weighs_lights()),
             ("sampled", self.samples_light()),
+            (
+                "signed",
+                self.has(Effect::Dispersion) || self.has(Effect::RadianceCache),
+            ),
             ("through", self.looks_through()),
             ("crossing", self.samples_light() && self.is_translucent()),
         ])

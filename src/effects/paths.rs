@@ -1,6 +1,9 @@
 //! Effects of how paths go on and where they end.
 
+use super::surfaces::forms_that;
 use super::{Effect, Row, when};
+use crate::cells::obstacle;
+use crate::materials::diffuse;
 use crate::settings::Integrator;
 
 pub(super) fn rows() -> Vec<Row> {
@@ -30,5 +33,53 @@ pub(super) fn rows() -> Vec<Row> {
         )
         .excludes([Effect::Lecture])
         .marks(["ROULETTE_FACTOR"]),
+        Row::new(
+            Effect::RadianceCache,
+            "radiance_cache",
+            "values of cells in the place of paths, drawn anew for every scramble and corrected without bias",
+            |asked| {
+                let settings = asked.settings;
+                let is_used = settings.radiance_cache
+                    && obstacle(asked.scene, asked.placement, settings).is_none();
+                when(is_used, || "--radiance-cache on".into())
+            },
+        )
+        .needs([Effect::Sobol])
+        .needs(diffuse())
+        .excludes([
+            Effect::Lecture,
+            Effect::Bvh,
+            Effect::Straddle,
+            Effect::Nested,
+            Effect::Nudge,
+            Effect::Ulp,
+            Effect::Motion,
+            Effect::Classes,
+            Effect::Adaptive,
+            Effect::Priority,
+            Effect::Absorption,
+            Effect::Dispersion,
+            Effect::TextureChecker,
+            Effect::TextureNoise,
+            Effect::TextureImage,
+        ])
+        .marks([
+            "cache",
+            "Path::plain",
+            "Path::arrived",
+            "Path::arrives_at",
+            "Path::first_value",
+            "Path::other",
+            "Begin",
+            "pairs",
+            "batch_sums",
+            "BATCHES",
+            "pilot",
+        ]),
     ]
+}
+
+/// The form of diffuse surfaces.
+fn diffuse() -> Vec<Effect> {
+    forms_that(|form| form.name == diffuse::NAME)
 }

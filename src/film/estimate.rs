@@ -31,7 +31,8 @@ impl Estimate {
         let count = film.rect().pixels();
         let values = (count * 3) as f64;
         let mean = (0..count).flat_map(|i| film.mean(i)).sum::<f64>() / values;
-        let floor = (0.1 * mean).powi(2);
+        let mean_squared = mean * mean;
+        let floor = 0.01 * mean_squared;
         // Sums and sums of squares, plain and of the jackknife.
         let mut sums = Some([[0.0; 2]; 2]);
         for i in 0..count {
@@ -51,6 +52,7 @@ impl Estimate {
             .map(|[sum, squares]| {
                 let mean = sum / pixels;
                 let variance = (squares / pixels - mean * mean).max(0.0) / pixels;
+                let variance = variance + shared_doubt(film, mean_squared).unwrap_or(0.0);
                 (mean + UPPER * variance.sqrt()).sqrt()
             })
             .filter(known);
@@ -69,6 +71,17 @@ impl Estimate {
     pub fn is_black(&self) -> bool {
         self.mean == 0.0
     }
+}
+
+/// What is not known of a mean of relative variances beside its spread over the pixels: where pixels of a batch have the
+/// same noise in them, as much of it as the image's mean has is estimated from the batches alone, and not once more by
+/// each pixel. The variance of such an estimate is 2/f of its square, with f degrees of freedom.
+fn shared_doubt(film: &Film, mean_squared: f64) -> Option<f64> {
+    let variance = film
+        .pixels_are_dependent()
+        .then(|| film.variance_of_image_mean())??;
+    let relative = variance.iter().sum::<f64>() / (3.0 * mean_squared);
+    Some(2.0 / film.freedom()? * relative * relative)
 }
 
 #[cfg(test)]
@@ -95,6 +108,7 @@ mod tests {
                 samples,
                 batch: 4,
                 aovs: Vec::new(),
+                image: Vec::new(),
                 pixels: vec![PixelSums {
                     sum: [sum; 3],
                     m2: [m2; 3],

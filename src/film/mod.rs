@@ -28,6 +28,6 @@ pub use sums::Film;
 pub(crate) use sums::PIXEL_BYTES;
 pub use trust::{Trust, Verdict};
 pub use window::{
-    BLOCK, LEAST_SAMPLES, NonFinite, PixelSums, Tally, WINDOW, Window, cut, half_of, next_look,
-    window_end,
+    BLOCK, LEAST_SAMPLES, NonFinite, PixelSums, Tally, WINDOW, Window, cut, full_batches, half_of,
+    next_look, window_end,
 };

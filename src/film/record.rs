@@ -18,6 +18,9 @@ pub struct Counts {
     tally: Tally,
     /// The paths that the tally is of.
     paths: u64,
+    /// Estimated variance of the sum over all pixels, where these are not independent of each other.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    image_variance: Option<[f64; 3]>,
 }
 
 impl Counts {
@@ -66,6 +69,7 @@ impl Film {
             levels: self.levels.clone(),
             tally: self.tally,
             paths: self.paths,
+            image_variance: self.image_variance,
         }
     }
 
@@ -125,6 +129,16 @@ impl Film {
                 return Err("counts of samples that no film can have".into());
             }
         }
+        let is_variance = |v: &f64| *v >= 0.0;
+        if !record
+            .counts
+            .image_variance
+            .iter()
+            .flatten()
+            .all(is_variance)
+        {
+            return Err("a variance of the image that is none".into());
+        }
         let tally = &record.counts.tally;
         let counted = [
             record.counts.paths,
@@ -143,6 +157,7 @@ impl Film {
             levels,
             halves: [(a, v), (b, w)].map(half),
             aovs: record.aovs,
+            image_variance: record.counts.image_variance,
             tally: record.counts.tally,
             paths: record.counts.paths,
         })
@@ -176,6 +191,10 @@ impl Film {
             level.batches += more.batches;
             level.covered += more.covered;
             level.doubt += more.doubt;
+        }
+        if let Some(more) = other.image_variance {
+            let total = self.image_variance.get_or_insert_default();
+            (0..3).for_each(|c| total[c] += more[c]);
         }
         self.count(&other.tally, other.paths);
     }

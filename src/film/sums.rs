@@ -15,6 +15,8 @@ pub struct Film {
     pub(super) halves: [Half; 2],
     /// Empty until a window has some.
     pub(super) aovs: Vec<AovSums>,
+    /// Estimated variance of the covered samples' sum over all pixels, where these are not independent of each other.
+    pub(super) image_variance: Option<[f64; 3]>,
     pub(super) tally: Tally,
     /// The paths that the tally is of.
     pub(super) paths: u64,
@@ -83,6 +85,7 @@ impl Film {
                 variance: vec![[0.0; 3]; pixels],
             }),
             aovs: Vec::new(),
+            image_variance: None,
             tally: Tally::default(),
             paths: 0,
         }
@@ -130,6 +133,15 @@ impl Film {
         for (i, (sums, more)) in self.aovs.iter_mut().zip(&window.aovs).enumerate() {
             if self.allocation.step(i) == step {
                 sums.add(more);
+            }
+        }
+        if !window.image.is_empty() {
+            let total = self.image_variance.get_or_insert_default();
+            let n = window.image.len() as f64;
+            for c in 0..3 {
+                let mean = window.image.iter().map(|sum| sum[c]).sum::<f64>() / n;
+                let squares = window.image.iter().map(|sum| (sum[c] - mean).powi(2));
+                total[c] += scale * squares.sum::<f64>();
             }
         }
         let samples = window.samples.end - window.samples.start;
@@ -235,6 +247,32 @@ impl Film {
         Some([0, 1, 2].map(|c| (a[c] + b[c]) * scale))
     }
 
+    /// Whether pixels of a batch are not independent of each other.
+    #[must_use]
+    pub fn pixels_are_dependent(&self) -> bool {
+        self.image_variance.is_some()
+    }
+
+    /// The estimated variance of the image's mean, by channel: from the batches' means over the whole image where pixels
+    /// of a batch are not independent of each other, else from the pixels' variances. `None` where these are not known.
+    #[must_use]
+    pub fn variance_of_image_mean(&self) -> Option<[f64; 3]> {
+        let pixels = self.rect().pixels();
+        let squared = (pixels as f64).powi(2);
+        if let (Some(total), [level]) = (self.image_variance, &self.levels[..]) {
+            let is_known = level.batches >= 16;
+            return is_known.then(|| total.map(|v| v * level.scale() / squared));
+        }
+        let mut sum = [0.0; 3];
+        for i in 0..pixels {
+            let variance = self.variance_of_mean(i)?;
+            for c in 0..3 {
+                sum[c] += variance[c];
+            }
+        }
+        Some(sum.map(|v| v / squared))
+    }
+
     /// The mean over the channels of s²/(m² + `floor`), with the mean m of pixel `i` and its standard
     /// error s, and its jackknife; `None` where this is not known.
     ///
@@ -335,6 +373,7 @@ mod tests {
                 rect,
                 batch: BLOCK,
                 aovs: Vec::new(),
+                image: Vec::new(),
                 pixels: (0..rect.pixels()).map(|_| pixel()).collect(),
                 tally: Tally::default(),
                 samples,

@@ -100,6 +100,8 @@ pub struct Window {
     pub batch: u64,
     /// One entry a pixel, rows from the top; zeros where a tile was not asked for.
     pub pixels: Vec<PixelSums>,
+    /// Where pixels of a batch are not independent of each other, for each full batch the sum over all pixels; else empty.
+    pub image: Vec<[f64; 3]>,
     /// The same of what was asked for beside the image; empty if that is nothing.
     pub aovs: Vec<AovSums>,
     /// What else happened.
@@ -110,8 +112,14 @@ impl Window {
     /// The number of batches that lie in the window as a whole.
     #[must_use]
     pub fn full_batches(&self) -> u64 {
-        (self.samples.end / self.batch).saturating_sub(self.samples.start.div_ceil(self.batch))
+        full_batches(&self.samples, self.batch)
     }
+}
+
+/// The number of batches of length `batch` that lie in a range of samples as a whole.
+#[must_use]
+pub fn full_batches(samples: &Range<u64>, batch: u64) -> u64 {
+    (samples.end / batch).saturating_sub(samples.start.div_ceil(batch))
 }
 
 /// Counts over any set of samples.

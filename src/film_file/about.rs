@@ -108,6 +108,9 @@ pub struct Choices {
     light_sampling: String,
     sampler: String,
     max_bounces: u32,
+    /// Absent in files of before it was there.
+    #[serde(default)]
+    radiance_cache: bool,
     roulette: bool,
     offset: String,
     adaptive: bool,
@@ -213,6 +216,7 @@ impl Choices {
             light_sampling: settings.light_sampling.name().into(),
             sampler: settings.sampler.name().into(),
             max_bounces: settings.max_bounces,
+            radiance_cache: settings.radiance_cache,
             roulette: settings.roulette,
             offset: settings.offset.to_string(),
             adaptive: settings.adaptive,
@@ -265,6 +269,7 @@ impl Choices {
                 |l| l.name(),
             )?,
             sampler: named("sampler", &self.sampler, Sampler::ALL, |s| s.name())?,
+            radiance_cache: self.radiance_cache,
             roulette: self.roulette,
             geometry: named("geometry", &self.geometry, GeometryChoice::ALL, |g| {
                 g.name()

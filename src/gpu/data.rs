@@ -8,8 +8,8 @@ use crate::effects::{Effect, Effects};
 use crate::error::{Error, Result};
 use crate::gpu::engine::{Pass, Recording};
 use crate::gpu::layout::{
-    LightRecord, PoleRecord, SKY_TABLE_WIDTH, SphereRecord, anchored_spheres, light_weight,
-    sky_table,
+    ChartRecord, LightRecord, PoleRecord, SKY_TABLE_WIDTH, SphereRecord, anchored_spheres,
+    light_weight, sky_table,
 };
 use crate::gpu::measured::{MEASURED_WIDTH, MeasuredTables};
 use crate::gpu::tables::SceneTables;
@@ -244,6 +244,7 @@ fn scene_data(
             "images" => bytemuck::cast_slice(tables.textures.images()).to_vec(),
             "parts" => parts(kernel, effects, tables),
             "part_weights" => bytemuck::cast_slice(tables.mixes.weights()).to_vec(),
+            "charts" => charts(placement),
             "lights" => lights(kernel, placement, effects),
             other => unreachable!("no scene data {other}"),
         };
@@ -308,6 +309,11 @@ fn attributes(scene: &Scene, placement: &Placement, effects: &Effects) -> Vec<u8
         }
     }
     bytes_of(words.into_iter())
+}
+
+fn charts(placement: &Placement) -> Vec<u8> {
+    let charts = (0..placement.spheres.len()).map(|i| ChartRecord::new(&placement.chart(i)));
+    bytes_of(charts)
 }
 
 /// The members of the kernel's `Material`, where each is, and its size.

@@ -9,6 +9,7 @@ use std::mem::offset_of;
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 
+use crate::cells::Chart;
 use crate::effects::{Effect, Effects};
 use crate::film::{TILE, Tiles};
 use crate::gpu::textures::Numbers;
@@ -261,6 +262,55 @@ pub struct DispatchRecord {
     /// Loop iterations after which the driver may have ended a loop in silence.
     pub step_most: u32,
     /// Padding.
+    pub unused: u32,
+}
+
+/// Columns of the texture `cell_values` of `shaders/cache/cells.wesl`.
+pub const CELLS_WIDTH: u32 = 1024;
+
+/// `Chart` of `shaders/cache/chart.wesl`.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+#[expect(missing_docs, reason = "the members are those of the kernel's struct")]
+pub struct ChartRecord {
+    pub first: u32,
+    pub side: u32,
+    pub diffuse: u32,
+    pub width: f32,
+    pub across: [f32; 3],
+    pub unused0: u32,
+    pub down: [f32; 3],
+    pub unused1: u32,
+}
+
+impl ChartRecord {
+    /// The record of a chart.
+    #[must_use]
+    pub fn new(chart: &Chart) -> Self {
+        let [across, down] = chart.axes.map(|axis| axis.as_vec3().to_array());
+        Self {
+            first: chart.first,
+            side: chart.side,
+            diffuse: u32::from(chart.diffuse),
+            width: chart.width.unwrap_or(0.0) as f32,
+            across,
+            down,
+            ..Self::zeroed()
+        }
+    }
+}
+
+/// `PilotWork` of `shaders/cache/pilot.wesl`.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+#[expect(missing_docs, reason = "the members are those of the kernel's struct")]
+pub struct PilotRecord {
+    pub stream: [u32; 2],
+    pub batch: u32,
+    pub begin: u32,
+    pub end: u32,
+    pub first_value: u32,
+    pub samples: u32,
     pub unused: u32,
 }
 

@@ -2,6 +2,7 @@
 
 mod aov;
 pub mod bsdf_probe;
+mod cache;
 mod data;
 pub mod device;
 mod engine;

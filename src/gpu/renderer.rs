@@ -9,8 +9,9 @@ use bytemuck::Zeroable as _;
 
 use crate::effects::Effect;
 use crate::error::{Error, Result};
-use crate::film::{AovSums, PixelSums, TILE, Tally, Tiles, Window};
+use crate::film::{AovSums, PixelSums, TILE, Tally, Tiles, Window, full_batches};
 use crate::gpu::aov::AovLayout;
+use crate::gpu::cache::{self, Cache};
 use crate::gpu::data::{self, SceneBytes};
 use crate::gpu::device::Gpu;
 use crate::gpu::engine::{Engine, Pass, Program, Recording};
@@ -39,6 +40,8 @@ pub struct GpuRenderer {
     engine: Engine,
     program: Program,
     render: Pass,
+    /// The radiance cache, if the kernel has one.
+    cache: Option<Cache>,
     crop: Rect,
     seed: u64,
     sampler: Sampler,
@@ -65,7 +68,11 @@ impl GpuRenderer {
         let (_, partial_size) = kernel
             .struct_members("Partial")
             .ok_or_else(|| Error::Shader("the kernel has no struct Partial".into()))?;
-        let side = region::side(&gpu.limits, partial_size);
+        let largest = match job.cells() {
+            Some(_) => partial_size.max(cache::PIXEL_BYTES),
+            None => partial_size,
+        };
+        let side = region::side(&gpu.limits, largest);
         let (width, height) = (
             settings.crop.width.min(side),
             settings.crop.height.min(side),
@@ -91,6 +98,9 @@ impl GpuRenderer {
             constants.push(("LECTURE_TERMINATION", termination));
         }
         let render = program.pass(&gpu, "render", &constants)?;
+        let cells = job.placement().cells();
+        let cache = cells.map(|cells| Cache::new(&gpu, &program, &constants, cells));
+        let cache = cache.transpose()?;
 
         let gl = gpu.summary.backend == "gl";
         let mut engine = Engine::new(gpu);
@@ -101,6 +111,9 @@ impl GpuRenderer {
         let aovs = AovLayout::of(program.kernel(), placement);
         if aovs.is_some() {
             engine.stage(PARTIALS)?;
+        }
+        if let Some(cache) = &cache {
+            cache.create(&mut engine, u64::from(width) * u64::from(height))?;
         }
         let camera = CameraRecord::new(&placement.camera);
         let all = ChosenTiles::all();
@@ -122,6 +135,7 @@ impl GpuRenderer {
             engine,
             program,
             render,
+            cache,
             crop: settings.crop,
             seed: settings.seed,
             sampler: settings.sampler,
@@ -270,9 +284,12 @@ impl GpuRenderer {
         region: Rect,
         samples: &Range<u64>,
         chosen: Option<&ChosenTiles>,
-    ) -> Result<(Vec<PixelSums>, Vec<AovSums>, Tally)> {
+    ) -> Result<RegionSums> {
         let mut recording = Recording::default();
         region::record(&mut recording, region);
+        if self.cache.is_some() {
+            Cache::record(&mut recording);
+        }
         if self.aovs.is_some() {
             recording.read(PARTIALS);
         }
@@ -292,8 +309,34 @@ impl GpuRenderer {
                 *sums = AovSums::default();
             }
         }
-        Ok((pixels, aovs, tally))
+        let batches = match &self.cache {
+            Some(_) => full_batches(samples, self.sampler.batch(samples.start)) as usize,
+            None => 0,
+        };
+        let mut image = Vec::new();
+        if batches > 0 {
+            image = Cache::sums(&readings, region, batches);
+            let scale = self.radiance_scale;
+            image
+                .iter_mut()
+                .for_each(|sum| *sum = sum.map(|x| x / scale));
+        }
+        Ok(RegionSums {
+            pixels,
+            aovs,
+            image,
+            tally,
+        })
     }
+}
+
+/// What a region's pixels have after a window.
+struct RegionSums {
+    pixels: Vec<PixelSums>,
+    aovs: Vec<AovSums>,
+    /// As in a [`Window`].
+    image: Vec<[f64; 3]>,
+    tally: Tally,
 }
 
 impl Renderer for GpuRenderer {
@@ -317,8 +360,13 @@ impl Renderer for GpuRenderer {
                 Some(_) => vec![AovSums::default(); self.crop.pixels()],
                 None => Vec::new(),
             },
+            image: Vec::new(),
             tally: Tally::default(),
         };
+        if let Some(cache) = &self.cache {
+            let rays = cache.fill(&mut self.engine, self.seed, &window.samples, window.batch)?;
+            window.tally.rays += rays;
+        }
         let adaptive = self.render.binds(ADAPTIVE_TILES);
         if tiles.is_some() && !adaptive {
             return Err(Error::Shader("the kernel renders all tiles or none".into()));
@@ -354,8 +402,17 @@ impl Renderer for GpuRenderer {
                 window.tally = Tally::default();
                 break;
             }
-            let (pixels, aovs, tally) = self.read(region, &window.samples, chosen)?;
+            let RegionSums {
+                pixels,
+                aovs,
+                image,
+                tally,
+            } = self.read(region, &window.samples, chosen)?;
             window.tally.add(&tally);
+            window.image.resize(image.len(), [0.0; 3]);
+            for (sum, more) in window.image.iter_mut().zip(&image) {
+                (0..3).for_each(|c| sum[c] += more[c]);
+            }
             let width = region.width as usize;
             for y in 0..region.height as usize {
                 let line = (region.y - self.crop.y) as usize + y;

@@ -50,6 +50,8 @@ pub struct Stats {
     pub sampler: String,
     /// The most scattering events of a path.
     pub max_bounces: u32,
+    /// Whether diffuse surfaces reflected by values of the radiance cache.
+    pub radiance_cache: bool,
     /// Whether paths ended by Russian roulette.
     pub roulette: bool,
     /// Where the time went.
@@ -67,6 +69,12 @@ pub struct Stats {
     /// Degrees of freedom of the pixels' standard errors, for Student's t; `null` where these are
     /// unknown.
     pub degrees_of_freedom: Option<f64>,
+    /// Standard errors of the image's mean, by channel, W/(sr m²); `null` where unknown. Where the radiance cache is used,
+    /// pixels of a batch are not independent of each other, and these are from the batches' means over the whole image.
+    pub mean_stderr: Option<[f64; 3]>,
+    /// Whether pixels of a batch are independent of each other.
+    #[serde(skip)]
+    pub independent_pixels: bool,
     /// Whether the variance, and with it the error, is one that samples can show: `finite`,
     /// `heavy-tailed`, or `infinite`, where the error is unknown.
     pub variance: VarianceClass,
@@ -169,6 +177,10 @@ impl Stats {
             .with("seconds", self.seconds.total);
         let metadata = match &self.trust {
             Some(verdict) => metadata.with("trust", verdict.to_string()),
+            None => metadata,
+        };
+        let metadata = match self.mean_stderr.filter(|_| !self.independent_pixels) {
+            Some([r, g, b]) => metadata.with("mean_stderr", format!("{r} {g} {b}")),
             None => metadata,
         };
         match self.degrees_of_freedom {

@@ -27,6 +27,7 @@ use std::sync::{Arc, OnceLock};
 use glam::DVec3;
 
 use crate::bvh::{Ball, Options, Tree};
+use crate::cells::{Cells, Chart};
 use crate::scene::{Scene, Sky};
 use crate::settings::Offset;
 use camera::approach;
@@ -64,6 +65,8 @@ pub struct Placement {
     /// Made when it is first asked for, and so is the next.
     tree: OnceLock<Tree>,
     sky: OnceLock<Arc<SkyTable>>,
+    /// Where a render asks for them.
+    cells: Option<Arc<Cells>>,
 }
 
 /// See [`Placement::mixed`].
@@ -169,6 +172,7 @@ impl Placement {
             offset,
             tree: OnceLock::new(),
             sky: OnceLock::new(),
+            cells: None,
         }
     }
 
@@ -185,6 +189,28 @@ impl Placement {
     #[must_use]
     pub fn sky_table(&self, sky: &Sky) -> &SkyTable {
         self.sky.get_or_init(|| Arc::new(SkyTable::new(sky)))
+    }
+
+    /// The cells of the radiance cache, if there is one.
+    #[must_use]
+    pub fn cells(&self) -> Option<&Arc<Cells>> {
+        self.cells.as_ref()
+    }
+
+    /// The same with a radiance cache of these cells.
+    #[must_use]
+    pub fn with_cells(self, cells: Cells) -> Self {
+        Self {
+            cells: Some(Arc::new(cells)),
+            ..self
+        }
+    }
+
+    /// The chart of a sphere.
+    #[must_use]
+    pub(crate) fn chart(&self, sphere: usize) -> Chart {
+        let cells = self.cells.as_ref();
+        cells.map_or(Chart::without_cells(false), |cells| cells.charts()[sphere])
     }
 
     /// The same with another table, for tests of one that is made wrongly.

@@ -173,6 +173,10 @@ fn change(
             settings.integrator = Integrator::Nee;
             "--integrator nee"
         }
+        Effect::RadianceCache => {
+            settings.radiance_cache = false;
+            "--radiance-cache off"
+        }
         Effect::Roulette => {
             settings.roulette = false;
             "--roulette off"

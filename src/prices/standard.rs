@@ -129,8 +129,9 @@ pub fn standard(effect: Effect) -> (Scene, Settings) {
                 termination: DEFAULT_TERMINATION,
             };
         }
-        // It ends long paths: those of a room.
-        Effect::Roulette => {
+        // They end long paths: those of a room.
+        Effect::Roulette | Effect::RadianceCache => {
+            settings.radiance_cache = effect == Effect::RadianceCache;
             scene = builtin::resolve(None)
                 .unwrap_or_else(|e| panic!("{e}"))
                 .scene;

@@ -4,9 +4,11 @@
 //! It is an oracle, written to be read: it takes no shortcut that the kernel takes and has no geometry
 //! form. What an effect leaves out of the kernel, it computes and finds to be nothing.
 
+pub mod cells;
 pub mod core;
 pub mod light;
 pub mod path;
 pub mod purpose;
 pub mod renderer;
 pub mod scene;
+pub mod survey;

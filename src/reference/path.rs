@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use super::cells::{Begin, Cache};
 use super::core::random::{random4, sample_key};
 use super::core::sobol::sobol4;
 use super::core::spectrum::sample_wavelength;
@@ -68,16 +69,22 @@ pub struct PathResult {
 }
 
 /// A path on its way.
-struct Path {
-    ray: Ray,
-    throughput: DVec3,
+pub(super) struct Path {
+    pub(super) ray: Ray,
+    pub(super) throughput: DVec3,
     /// Product of the index ratios squared of the refractions so far.
-    eta_scale: f64,
+    pub(super) eta_scale: f64,
     /// That it keeps, in nm.
     wavelength: Option<f64>,
     departure: Departure,
-    class: LightClass,
-    found: PathResult,
+    pub(super) class: LightClass,
+    pub(super) found: PathResult,
+    /// Whether it asks no cell of the radiance cache: it is a pilot's, or corrects a value.
+    pub(super) plain: bool,
+    /// What its ray hits, where that is known.
+    pub(super) arrives_at: Option<Option<Hit>>,
+    /// What is left to do when it has ended.
+    pub(super) other: Option<Begin>,
 }
 
 /// What light sampling has left of the path's way to go on from a vertex.
@@ -90,7 +97,23 @@ struct Departure {
 }
 
 impl Path {
-    fn receive(&mut self, class: LightClass, radiance: DVec3) {
+    /// One that starts with a ray, at this time.
+    pub(super) fn new(ray: Ray, time: f64) -> Self {
+        Self {
+            ray: Ray { time, ..ray },
+            throughput: DVec3::ONE,
+            eta_scale: 1.0,
+            wavelength: None,
+            departure: Departure::default(),
+            class: LightClass::Emission,
+            found: PathResult::default(),
+            plain: false,
+            arrives_at: None,
+            other: None,
+        }
+    }
+
+    pub(super) fn receive(&mut self, class: LightClass, radiance: DVec3) {
         self.found.radiance += radiance;
         let sum = &mut self.found.aovs.classes[class as usize];
         *sum = (DVec3::from(*sum) + radiance).to_array();
@@ -106,12 +129,37 @@ pub struct PathTracer<'a> {
     pub placement: &'a Placement,
     /// The options.
     pub settings: &'a Settings,
+    /// The radiance cache for the batch of the samples that are traced, if there is one.
+    pub cache: Option<Cache<'a>>,
+}
+
+impl<'a> PathTracer<'a> {
+    /// One that renders as `settings` say, without a cache.
+    #[must_use]
+    pub fn new(scene: &'a Scene, placement: &'a Placement, settings: &'a Settings) -> Self {
+        Self {
+            scene,
+            placement,
+            settings,
+            cache: None,
+        }
+    }
 }
 
 impl PathTracer<'_> {
     /// Traces sample `sample` of `pixel`.
     #[must_use]
     pub fn trace(&self, pixel: [u32; 2], sample: u64) -> PathResult {
+        self.trace_seen(pixel, sample, &mut |_, _| {})
+    }
+
+    /// The same; `see` gets to know each ray that arrives at a surface, and where.
+    pub(super) fn trace_seen(
+        &self,
+        pixel: [u32; 2],
+        sample: u64,
+        see: &mut dyn FnMut(&Ray, &Hit),
+    ) -> PathResult {
         let settings = self.settings;
         let stream = stream_words(settings.seed, (sample >> 32) as u32);
         let (index, last) = (sample as u32, settings.sampler.batch(sample) as u32 - 1);
@@ -123,26 +171,40 @@ impl PathTracer<'_> {
             }
         };
         let placement = self.placement;
-        let mut path = Path {
-            ray: camera_ray(&placement.camera, pixel, random(CAMERA), &placement.within),
-            throughput: DVec3::ONE,
-            eta_scale: 1.0,
-            wavelength: None,
-            departure: Departure::default(),
-            class: LightClass::Emission,
-            found: PathResult::default(),
-        };
-        path.ray.time = random(TIME)[0] - 0.5;
-        while self.extend(&mut path, &random) {}
+        let ray = camera_ray(&placement.camera, pixel, random(CAMERA), &placement.within);
+        let mut path = Path::new(ray, random(TIME)[0] - 0.5);
+        self.follow(&mut path, &random, see);
         path.found
+    }
+
+    /// Follows a path to its end.
+    pub(super) fn follow(
+        &self,
+        path: &mut Path,
+        random: &dyn Fn(u32) -> [f64; 4],
+        see: &mut dyn FnMut(&Ray, &Hit),
+    ) {
+        loop {
+            while self.extend(path, random, see) {}
+            if !path.go_back() {
+                break;
+            }
+        }
     }
 
     /// One step of L = Le + integral of f L cos: extends the path by a ray, takes up what is emitted where
     /// it arrives and what the lamps send there, and lets the BSDF choose where it goes on. Whether it
     /// does.
-    fn extend(&self, path: &mut Path, random: &dyn Fn(u32) -> [f64; 4]) -> bool {
-        path.found.rays += 1;
-        let hit = closest_hit(&path.ray, &self.placement.spheres);
+    fn extend(
+        &self,
+        path: &mut Path,
+        random: &dyn Fn(u32) -> [f64; 4],
+        see: &mut dyn FnMut(&Ray, &Hit),
+    ) -> bool {
+        let hit = self.arrival(path);
+        if let Some(hit) = &hit {
+            see(&path.ray, hit);
+        }
         path.throughput *= self.transmittance(&path.ray.media, hit.map(|hit| hit.t));
         let Some(hit) = hit else {
             let w = path.ray.direction;
@@ -169,7 +231,7 @@ impl PathTracer<'_> {
             self.see(path, &hit, &vertex, kind);
         }
         if path.found.bounces == self.settings.max_bounces {
-            path.found.cut = path.throughput.abs();
+            path.found.cut += path.throughput.abs();
             return false;
         }
         let u = random(scattering(path.found.bounces));
@@ -198,7 +260,11 @@ impl PathTracer<'_> {
             path.departure.pdf_per_weight = direct.pdf_per_weight;
         }
         let s = self.sample(kind, &surface, wo, u);
-        self.go_on(path, &hit, &vertex, &s, u[3])
+        let goes_on = self.go_on(path, &hit, &vertex, &s, u[3]);
+        goes_on
+            && self
+                .cache
+                .is_none_or(|cache| !self.use_cell(&cache, path, (u[2], random)))
     }
 
     /// Where on its sphere a vertex is.
@@ -502,11 +568,7 @@ mod tests {
         let scene = load_str("test", text).expect("a scene").scene;
         let settings = Settings::for_scene(&scene);
         let placement = Placement::new(&scene, 8, 8);
-        let tracer = PathTracer {
-            scene: &scene,
-            placement: &placement,
-            settings: &settings,
-        };
+        let tracer = PathTracer::new(&scene, &placement, &settings);
         // From a point within that a rounding has put outside.
         let mut ray = camera_ray(&placement.camera, [0, 0], [0.5; 4], &placement.within);
         let sphere = &placement.spheres[0];

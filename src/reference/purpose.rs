@@ -16,6 +16,12 @@ pub fn scattering(bounce: u32) -> u32 {
     4 * (bounce + 1)
 }
 
+/// The other point of a cell (x, y).
+#[must_use]
+pub fn pairs(bounce: u32) -> u32 {
+    4 * (bounce + 1) + 3
+}
+
 /// Light sampling at its vertex: direction (x, y), choice of the light (z, w).
 #[must_use]
 pub fn lighting(bounce: u32) -> u32 {

@@ -5,7 +5,9 @@ use std::ops::Range;
 use glam::DVec3;
 use rayon::prelude::*;
 
+use super::cells::{CORRECTED, Cache};
 use super::path::{PathResult, PathTracer};
+use crate::cells::Cells;
 use crate::error::{Error, Result};
 use crate::film::{AovSums, BLOCK, NonFinite, PixelSums, Tally, Tiles, Window};
 use crate::job::Job;
@@ -42,11 +44,30 @@ impl ReferenceRenderer {
         })
     }
 
-    fn pixel(&self, pixel: [u32; 2], samples: &Range<u64>, state: &mut PixelState) {
+    fn cells(&self) -> Option<&Cells> {
+        self.placement.cells().map(AsRef::as_ref)
+    }
+
+    fn tracer(&self) -> PathTracer<'_> {
+        PathTracer::new(&self.scene, &self.placement, &self.settings)
+    }
+
+    /// Takes samples of a pixel, by the values of the cells for their batch.
+    fn pixel(
+        &self,
+        pixel: [u32; 2],
+        samples: &Range<u64>,
+        values: &[DVec3],
+        state: &mut PixelState,
+    ) {
+        let cache = |cells| Cache {
+            cells,
+            values,
+            corrected: CORRECTED,
+        };
         let tracer = PathTracer {
-            scene: &self.scene,
-            placement: &self.placement,
-            settings: &self.settings,
+            cache: self.cells().map(cache),
+            ..self.tracer()
         };
         for sample in samples.clone() {
             let path = tracer.trace(pixel, sample);
@@ -69,6 +90,8 @@ struct PixelState {
     batches: f64,
     batch_mean: DVec3,
     tally: Tally,
+    /// Sums of the full batches, where the image's are asked for.
+    full: Option<Vec<DVec3>>,
 }
 
 impl PixelState {
@@ -105,6 +128,9 @@ impl PixelState {
             self.batches += 1.0;
             let delta = self.batch - self.batch_mean;
             self.batch_mean += delta / self.batches;
+            if let Some(full) = &mut self.full {
+                full.push(self.batch);
+            }
             let m2 = delta * (self.batch - self.batch_mean);
             self.sums.m2 = (DVec3::from(self.sums.m2) + m2).to_array();
         }
@@ -137,14 +163,25 @@ impl Renderer for ReferenceRenderer {
         let width = crop.width as usize;
         let blank = PixelState {
             aovs: self.settings.has_aovs().then(Box::default),
+            full: self.cells().map(|_| Vec::new()),
             ..PixelState::default()
         };
         let mut state = vec![blank; crop.pixels()];
         let chosen = |x: usize, y: usize| tiles.is_none_or(|t| t.has_pixel(x as u32, y as u32));
         let all = (0..crop.pixels()).filter(|i| chosen(i % width, i / width));
         let all = all.count() as u64;
-        let mut start = samples.start;
+        let mut tally = Tally::default();
+        let batch = self.settings.sampler.batch(samples.start);
+        let (mut start, mut values, mut of_batch) = (samples.start, Vec::new(), None);
         while start < samples.end {
+            if let Some(cells) = self.cells()
+                && of_batch != Some(start / batch)
+            {
+                let pilot = || self.tracer().pilot(cells, start / batch * batch, batch);
+                let (found, rays) = self.threads.install(pilot);
+                (values, of_batch) = (found, Some(start / batch));
+                tally.rays += rays;
+            }
             // A block at a time over the whole image: then it can stop.
             let end = (start / BLOCK * BLOCK)
                 .saturating_add(BLOCK)
@@ -159,7 +196,7 @@ impl Renderer for ReferenceRenderer {
                                 continue;
                             }
                             let pixel = [crop.x + x as u32, crop.y + y as u32];
-                            self.pixel(pixel, &(start..end), state);
+                            self.pixel(pixel, &(start..end), &values, state);
                         }
                     });
             });
@@ -169,12 +206,27 @@ impl Renderer for ReferenceRenderer {
                 break;
             }
         }
-        let mut tally = Tally::default();
         for pixel in &mut state {
             pixel.end_batch(false);
             tally.add(&pixel.tally);
         }
+        let mut image = vec![
+            DVec3::ZERO;
+            state
+                .iter()
+                .filter_map(|s| s.full.as_ref())
+                .map(Vec::len)
+                .max()
+                .unwrap_or(0)
+        ];
+        for full in state.iter().filter_map(|s| s.full.as_ref()) {
+            image
+                .iter_mut()
+                .zip(full)
+                .for_each(|(sum, more)| *sum += *more);
+        }
         Ok(Window {
+            image: image.into_iter().map(|sum| sum.to_array()).collect(),
             rect: crop,
             samples: samples.start..start,
             batch: self.settings.sampler.batch(samples.start),

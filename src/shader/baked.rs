@@ -6,6 +6,7 @@ use std::fmt::Write as _;
 use glam::DVec3;
 
 use super::bsdf::members;
+use crate::cells::Chart;
 use crate::effects::{Effect, Effects};
 use crate::gpu::layout::{MaterialRecord, light_weight};
 use crate::gpu::tables::SceneTables;
@@ -74,6 +75,10 @@ pub(super) fn attributes(scene: &Scene, placement: &Placement, effects: &Effects
     }
     frame_of(&mut text, placement, effects);
     material_of(&mut text, scene, placement, effects);
+    if effects.has(Effect::RadianceCache) {
+        text.insert_str(0, "import package::cache::chart::Chart;\n");
+        chart_of(&mut text, placement);
+    }
     if effects.has(Effect::Lights) {
         light_weights(&mut text, placement, effects);
     }
@@ -232,6 +237,35 @@ fn material_of(text: &mut String, scene: &Scene, placement: &Placement, effects:
         choose(text, "level", &levels);
         *text += "return level;\n}\n";
     }
+}
+
+/// The charts that the radiance cache's cells are of.
+fn chart_of(text: &mut String, placement: &Placement) {
+    let charts: Vec<Chart> = (0..placement.spheres.len())
+        .map(|i| placement.chart(i))
+        .collect();
+    let each = |value: &dyn Fn(&Chart) -> String| charts.iter().map(value).collect::<Vec<_>>();
+    *text += "fn chart_of(index: u32) -> Chart {\nvar chart: Chart;\n";
+    choose(text, "chart.first", &each(&|c| format!("{}u", c.first)));
+    choose(text, "chart.side", &each(&|c| format!("{}u", c.side)));
+    choose(
+        text,
+        "chart.diffuse",
+        &each(&|c| format!("{}u", u32::from(c.diffuse))),
+    );
+    choose(
+        text,
+        "chart.width",
+        &each(&|c| number(c.width.unwrap_or(0.0))),
+    );
+    for (i, name) in ["across", "down"].iter().enumerate() {
+        choose(
+            text,
+            &format!("chart.{name}"),
+            &each(&|c| vector(c.axes[i])),
+        );
+    }
+    *text += "return chart;\n}\n";
 }
 
 /// What spheres count for as lights, and unless they are drawn from a table, their weighing.

@@ -21,7 +21,7 @@ use wesl::{CompileOptions, ManglerKind, ModulePath, VirtualResolver, Wesl};
 use crate::bvh;
 use crate::effects::{Effect, Effects, Role};
 use crate::error::{Error, Result};
-use crate::gpu::layout::{SKY_TABLE_WIDTH, anchored_spheres};
+use crate::gpu::layout::{CELLS_WIDTH, SKY_TABLE_WIDTH, anchored_spheres};
 use crate::gpu::measured::MEASURED_WIDTH;
 use crate::gpu::tables::SceneTables;
 use crate::gpu::textures::{IMAGE_WIDTH, TextureTable};
@@ -247,6 +247,11 @@ fn config(scene: &Scene, placement: &Placement, effects: &Effects) -> String {
         if effects.has(Effect::Pole) {
             text += &format!("const POLE_COUNT: u32 = {}u;\n", placement.poles);
         }
+    }
+    if effects.has(Effect::RadianceCache) {
+        let cells = placement.cells().map_or(0, |cells| cells.count());
+        text +=
+            &format!("const CELLS: u32 = {cells}u;\nconst CELLS_WIDTH: u32 = {CELLS_WIDTH}u;\n");
     }
     if effects.has(Effect::Bvh) {
         let tree = placement.tree();

@@ -12,6 +12,9 @@ macro_rules! sources {
 sources![
     "path",
     "probe",
+    "cache/cells",
+    "cache/chart",
+    "cache/pilot",
     "core/random",
     "core/sampling",
     "core/spectrum",

@@ -36,12 +36,18 @@ pub struct Loop {
 }
 
 /// All loops of the path tracer's kernel.
-pub const LOOPS: [Loop; 17] = [
+pub const LOOPS: [Loop; 18] = [
     // Over vertices.
     Loop {
         function: "render",
         used: |_| true,
         at_vertex: |_, _| 1,
+    },
+    // Over those of the radiance cache's pilots: as many as `render` counts, once a loop turn.
+    Loop {
+        function: "pilot",
+        used: |effects| effects.has(Effect::RadianceCache),
+        at_vertex: |_, _| 0,
     },
     // Over spheres about their poles.
     Loop {
@@ -191,9 +197,10 @@ fn parts_visited(placement: &Placement, effects: &Effects) -> usize {
     }
 }
 
-/// Rays that are traced at a vertex: with light sampling also one to a light.
+/// Rays that are traced at a vertex: with light sampling also one to a light, and with the radiance cache one to another
+/// point of a cell.
 fn rays(effects: &Effects) -> usize {
-    1 + usize::from(effects.samples_light())
+    1 + usize::from(effects.samples_light()) + usize::from(effects.has(Effect::RadianceCache))
 }
 
 /// Most loop iterations that the kernel makes for one vertex of a path, but for those of loops that count themselves.
@@ -216,7 +223,13 @@ pub fn step_limit(placement: &Placement, effects: &Effects, max_bounces: u32, gl
     }
     // A path that is begun must fit.
     let vertex = u64::from(vertex_steps(placement, effects));
-    let path = (u64::from(max_bounces) + 1) * vertex;
+    // What corrects a value of the radiance cache is two paths.
+    let paths = if effects.has(Effect::RadianceCache) {
+        2
+    } else {
+        1
+    };
+    let path = paths * (u64::from(max_bounces) + 1) * vertex;
     LOOP_ITERATIONS.saturating_sub(path).max(1) as u32
 }
 

@@ -189,6 +189,7 @@ mod tests {
         };
         let mut film = Film::new(rect);
         film.add(&Window {
+            image: Vec::new(),
             rect,
             samples: 0..1,
             batch: 4,

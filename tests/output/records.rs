@@ -33,6 +33,9 @@ fn statistics() -> Stats {
         integrator: "path".into(),
         sampler: "random".into(),
         max_bounces: 64,
+        radiance_cache: false,
+        mean_stderr: None,
+        independent_pixels: true,
         roulette: true,
         seconds: stats::Seconds {
             total: 2.5,
@@ -97,6 +100,8 @@ fn statistics_are_valid_json() {
         "stopped_by",
         "version",
         "max_bounces",
+        "radiance_cache",
+        "mean_stderr",
         "roulette",
         "black",
         "bounce_limit",

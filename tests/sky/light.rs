@@ -340,11 +340,7 @@ fn twin(scene: &Scene, placement: &Placement, spp: u64) -> (f64, f64) {
         integrator: Integrator::Nee,
         ..settings(scene, 16, 16, spp)
     };
-    let tracer = PathTracer {
-        scene,
-        placement,
-        settings: &settings,
-    };
+    let tracer = PathTracer::new(scene, placement, &settings);
     let pixel = |i: u32| {
         let sum: f64 = (0..spp)
             .map(|s| tracer.trace([i % 16, i / 16], s).radiance.x)

@@ -48,7 +48,7 @@ pub(super) struct EffectsArgs {
         long,
         requires = "measure",
         conflicts_with_all = [
-            "scene", "size", "integrator", "light_sampling", "sampler", "max_bounces", "roulette",
+            "scene", "size", "integrator", "light_sampling", "sampler", "max_bounces", "radiance_cache", "roulette",
             "termination", "offset", "geometry", "aov", "view", "adaptive", "spp", "error", "time",
             "sample_range", "dump_wgsl",
         ],
@@ -92,7 +92,10 @@ pub(super) fn run(args: &EffectsArgs) -> Result<()> {
             "effects": rows,
         }));
     }
-    let chosen = choice.as_ref().map(why_chosen).unwrap_or_default();
+    let mut chosen = choice.as_ref().map(why_chosen).unwrap_or_default();
+    if let Some(why) = job.cache_obstacle() {
+        let _ = writeln!(chosen, "\n--radiance-cache is off: {why}");
+    }
     print(&(table(&loaded.name, effects, lines) + &chosen))
 }
 

@@ -40,6 +40,7 @@ pub(super) fn statistics(
         integrator: settings.integrator.name().into(),
         sampler: settings.sampler.name().into(),
         max_bounces: settings.max_bounces,
+        radiance_cache: job.cells().is_some(),
         roulette: settings.roulette,
         seconds: Seconds::default(),
         samples,
@@ -51,6 +52,12 @@ pub(super) fn statistics(
             .trust
             .map(|trust| trust.verdict(heavy_tailed)),
         degrees_of_freedom: outcome.estimate.error.and_then(|_| film.freedom()),
+        mean_stderr: outcome
+            .estimate
+            .error
+            .and_then(|_| film.variance_of_image_mean())
+            .map(|variance| variance.map(f64::sqrt)),
+        independent_pixels: !film.pixels_are_dependent(),
         variance: job.variance().class,
         black: outcome.estimate.is_black(),
         non_finite: tally.non_finite,

@@ -3,6 +3,7 @@
 use crate::cli::args::RenderArgs;
 use crate::cli::format::{percent, significant};
 use crate::film::NonFinite;
+use crate::job::Job;
 use crate::ledger::Entry;
 use crate::output::{Aov, Plane, Stats};
 use crate::placement::Placement;
@@ -102,6 +103,12 @@ pub(super) fn left_out(placement: &Placement) -> Option<String> {
              which is where sphere {other} is"
         ),
     })
+}
+
+/// Why there is no radiance cache, where one is asked for.
+pub(super) fn without_cache(job: &Job) -> Option<String> {
+    let why = job.cache_obstacle()?;
+    Some(format!("--radiance-cache on is without effect: {why}"))
 }
 
 /// What the user should know about the outcome.

@@ -54,6 +54,7 @@ impl Passed {
             light_sampling,
             sampler,
             max_bounces,
+            radiance_cache,
             roulette,
             termination,
             offset,
@@ -136,6 +137,10 @@ impl Passed {
         give("light-sampling", light_sampling.map(|l| l.name().into()));
         give("sampler", unless(Sampler::Sobol, sampler, |s| s.name()));
         give("max-bounces", max_bounces.map(|n| n.to_string()));
+        give(
+            "radiance-cache",
+            radiance_cache.map(|on| if on { "on" } else { "off" }.into()),
+        );
         give(
             "roulette",
             roulette.map(|on| if on { "on" } else { "off" }.into()),
@@ -229,7 +234,7 @@ mod tests {
         for typed in [
             all,
             "--integrator lecture --termination 0.123456789012345678 --quiet",
-            "--integrator nee --backend cpu --roulette on",
+            "--integrator nee --backend cpu --roulette on --radiance-cache off",
             "",
         ] {
             let args = parse(typed.split_whitespace());

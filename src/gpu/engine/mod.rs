@@ -117,6 +117,11 @@ impl Engine {
                         most,
                     );
                 }
+                Command::Copy { from, to } => {
+                    let encoder = pending.get_or_insert_with(encoder);
+                    self.resource(from)?
+                        .copy_to_texels(encoder, self.resource(to)?);
+                }
                 Command::Read { name, part } => {
                     self.stage(name)?;
                     let encoder = pending.get_or_insert_with(encoder);

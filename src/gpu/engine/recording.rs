@@ -22,6 +22,10 @@ pub(super) enum Command<'a> {
         pass: &'a Pass,
         workgroups: u32,
     },
+    Copy {
+        from: &'static str,
+        to: &'static str,
+    },
     Read {
         name: &'static str,
         part: Option<[u32; 2]>,
@@ -65,6 +69,12 @@ impl<'a> Recording<'a> {
     /// last may be longer than needed.
     pub(in crate::gpu) fn dispatch(&mut self, pass: &'a Pass, workgroups: u32) -> &mut Self {
         self.push(Command::Dispatch { pass, workgroups })
+    }
+
+    /// Copies the start of the buffer `from` to all of the texture `to`, which passes only read and which has rows of a
+    /// multiple of 16 texels.
+    pub(in crate::gpu) fn copy(&mut self, from: &'static str, to: &'static str) -> &mut Self {
+        self.push(Command::Copy { from, to })
     }
 
     /// Reads the buffer `name`. Nothing can be read twice in one recording.

@@ -124,6 +124,21 @@ impl Resource {
         });
     }
 
+    /// Records the copy of a buffer's start to all of a texture that passes only read, whose rows it has.
+    pub(super) fn copy_to_texels(&self, encoder: &mut wgpu::CommandEncoder, to: &Self) {
+        if let (Content::Buffer(buffer), Content::Texture(texture, _)) =
+            (&self.content, &to.content)
+        {
+            let layout = wgpu::TexelCopyBufferLayout {
+                offset: 0,
+                bytes_per_row: Some(texture.width() * TEXEL),
+                rows_per_image: None,
+            };
+            let from = wgpu::TexelCopyBufferInfo { buffer, layout };
+            encoder.copy_buffer_to_texture(from, texture.as_image_copy(), texture.size());
+        }
+    }
+
     /// Records the copy of a buffer, or of `part` of a texture, to what [`Resource::stage`] has made.
     pub(super) fn copy(
         &self,

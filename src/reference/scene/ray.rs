@@ -20,6 +20,23 @@ pub struct Ray {
     pub media: Media,
 }
 
+impl Ray {
+    /// One that is in no dielectric; where it is and goes is left open.
+    #[must_use]
+    pub fn in_vacuum() -> Self {
+        Self {
+            anchor: DVec3::ZERO,
+            motion: DVec3::ZERO,
+            time: 0.0,
+            offset: DVec3::ZERO,
+            direction: DVec3::ZERO,
+            own: None,
+            inward: false,
+            media: Media::default(),
+        }
+    }
+}
+
 /// The nearest hit of a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {

@@ -1,0 +1,84 @@
+//! Where the radiance cache is not used, and why.
+
+use crate::materials::diffuse;
+use crate::placement::{PlacedSphere, Placement, Side};
+use crate::sampler::Sampler;
+use crate::scene::Scene;
+use crate::settings::{DEFAULT_MAX_BOUNCES, GeometryChoice, Integrator, Offset, Settings};
+
+/// Most spheres of a scene with a cache: beyond, cells would be more than what they save.
+const MOST_SPHERES: usize = 64;
+/// Most bounces: a pilot's sample then fits what drivers let an invocation do.
+const MOST_BOUNCES: u32 = 1024;
+
+/// Whether all that a sphere does is to reflect by Lambert's law, with a light of its own or not.
+pub(crate) fn is_diffuse(scene: &Scene, sphere: &PlacedSphere) -> bool {
+    let material = &scene.materials[sphere.material];
+    material.kind.form().name == diffuse::NAME
+}
+
+/// Why a render has no radiance cache; `None` where it can have one.
+#[must_use]
+pub fn obstacle(scene: &Scene, placement: &Placement, settings: &Settings) -> Option<&'static str> {
+    let kinds = || {
+        let spheres = placement.spheres.iter();
+        spheres.map(|sphere| &scene.materials[sphere.material])
+    };
+    let lit = kinds().any(|material| material.emission != glam::DVec3::ZERO);
+    let obstacles = [
+        (
+            settings.integrator != Integrator::Path,
+            "--integrator is not path",
+        ),
+        (
+            settings.sampler != Sampler::Sobol,
+            "--sampler is not sobol: there are no scrambles",
+        ),
+        (
+            settings.max_bounces < DEFAULT_MAX_BOUNCES,
+            "--max-bounces is below 64, which a cell's value would not hold to",
+        ),
+        (
+            settings.max_bounces > MOST_BOUNCES,
+            "--max-bounces is above 1024",
+        ),
+        (settings.adaptive, "--adaptive"),
+        (settings.classes, "layers by the kind of path"),
+        (settings.view.is_some(), "--view"),
+        (settings.offset != Offset::Exact, "--offset is not exact"),
+        (
+            settings.geometry == GeometryChoice::Bvh || placement.spheres.len() > MOST_SPHERES,
+            "a tree over the spheres",
+        ),
+        (placement.moves(), "spheres that move"),
+        (
+            kinds().any(|material| !material.textures.is_empty()),
+            "textures",
+        ),
+        (
+            kinds().any(|material| material.kind.dispersion().is_some()),
+            "dispersion",
+        ),
+        (
+            kinds().any(|material| material.kind.absorption() != glam::DVec3::ZERO),
+            "absorption",
+        ),
+        (placement.media.levels > 0, "dielectrics that share points"),
+        (!placement.within.is_empty(), "a camera in a dielectric"),
+        (
+            placement.spheres.iter().any(|s| s.side == Side::Sign),
+            "a surface that the lens straddles",
+        ),
+        (
+            placement.spheres.iter().any(|s| s.container.is_some()),
+            "surfaces just within a dielectric",
+        ),
+        (
+            !placement.spheres.iter().any(|s| is_diffuse(scene, s)),
+            "no sphere is diffuse",
+        ),
+        (!lit && scene.environment.is_none(), "there is no light"),
+    ];
+    let first = obstacles.into_iter().find(|(is, _)| *is);
+    first.map(|(_, why)| why)
+}

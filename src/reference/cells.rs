@@ -1,0 +1,232 @@
+//! Twin of `shaders/cache/cells.wesl` and `pilot.wesl`: values of cells in the place of paths, what corrects them, and
+//! the pilots that they come from.
+
+use glam::{DVec2, DVec3};
+use rayon::prelude::*;
+
+use super::core::random::sample_key;
+use super::core::sobol::sobol4;
+use super::path::{Path, PathResult, PathTracer};
+use super::purpose::{CAMERA, pairs};
+use super::scene::ray::{Hit, Ray, vertex_at};
+use super::scene::sphere::closest_hit;
+use crate::cells::chart::ChartPoint;
+use crate::cells::{Cell, Cells};
+use crate::placement::PlacedSphere;
+use crate::settings::pilot_words;
+
+/// The probability with which a value is corrected.
+pub const CORRECTED: f64 = 0.25;
+
+/// The radiance cache for one batch of samples.
+#[derive(Clone, Copy, Debug)]
+pub struct Cache<'a> {
+    /// Which cells there are.
+    pub cells: &'a Cells,
+    /// The mean of the radiance that each of those in use reflects, W/(sr m²).
+    pub values: &'a [DVec3],
+    /// [`CORRECTED`]; another one for tests of what that does.
+    pub corrected: f64,
+}
+
+/// Where a part of a path begins.
+pub(super) struct Begin {
+    ray: Ray,
+    throughput: DVec3,
+    bounces: u32,
+    sphere: usize,
+}
+
+impl Path {
+    /// Whether another part of the path is left: it goes on there.
+    pub(super) fn go_back(&mut self) -> bool {
+        let Some(begin) = self.other.take() else {
+            return false;
+        };
+        self.ray = begin.ray;
+        self.throughput = begin.throughput;
+        self.found.bounces = begin.bounces;
+        self.begin_on(begin.sphere);
+        true
+    }
+
+    /// Lets it arrive on this sphere without a ray.
+    fn begin_on(&mut self, index: usize) {
+        self.arrives_at = Some(Some(Hit {
+            t: 0.0,
+            index,
+            inside: false,
+        }));
+    }
+}
+
+/// A ray that arrives at a point of `sphere`, where a path begins.
+fn begin_at(arrived: &Ray, point: &ChartPoint, sphere: &PlacedSphere) -> Ray {
+    Ray {
+        anchor: sphere.anchor,
+        offset: point.offset,
+        direction: -point.normal,
+        own: None,
+        ..arrived.clone()
+    }
+}
+
+/// The pdf on a chart with which a cosine-weighted direction finds a point, times π; 0 for one that turns away.
+fn density(from: DVec3, direction: DVec3, to: DVec3, distance: f64, area: f64) -> f64 {
+    let cosines = from.dot(direction).max(0.0) * (-to.dot(direction)).max(0.0);
+    cosines * area / (distance * distance)
+}
+
+impl PathTracer<'_> {
+    /// What the path's ray hits, which may be known.
+    pub(super) fn arrival(&self, path: &mut Path) -> Option<Hit> {
+        if let Some(hit) = path.arrives_at.take() {
+            return hit;
+        }
+        path.found.rays += 1;
+        closest_hit(&path.ray, &self.placement.spheres)
+    }
+
+    /// Where a path leaves a diffuse surface, at x, for a cell that has a value: takes that in the place of all light that
+    /// would be reflected there; whether the path ends with it. Else it goes on to correct the value: by what is
+    /// reflected at the point y of the cell that it comes to, and, when it has ended, less what is at another one, y'.
+    /// u: uniform, for both choices.
+    pub(super) fn use_cell(
+        &self,
+        cache: &Cache<'_>,
+        path: &mut Path,
+        (u, random): (f64, &dyn Fn(u32) -> [f64; 4]),
+    ) -> bool {
+        let charts = cache.cells.charts();
+        let Some(own) = path
+            .ray
+            .own
+            .filter(|own| !path.plain && charts[*own].diffuse)
+        else {
+            return false;
+        };
+        let spheres = &self.placement.spheres;
+        path.found.rays += 1;
+        let hit = closest_hit(&path.ray, spheres);
+        path.arrives_at = Some(hit);
+        let Some(hit) = hit.filter(|hit| !hit.inside && charts[hit.index].side > 0) else {
+            return false;
+        };
+        let (chart, sphere) = (&charts[hit.index], &spheres[hit.index]);
+        let vertex = vertex_at(&path.ray, &hit, sphere);
+        let place = chart.place(vertex.offset);
+        let [column, row] = chart.cell(place);
+        let cell = Cell {
+            sphere: hit.index as u16,
+            row,
+            column,
+        };
+        let number = cache.cells.number(cell);
+        let Some(number) = number.filter(|_| hit.t >= chart.cell_size(sphere, place)) else {
+            return false;
+        };
+        path.receive(path.class, path.throughput * cache.values[number]);
+        let corrected = cache.corrected;
+        if u >= corrected {
+            return true;
+        }
+
+        let [x, y, ..] = random(pairs(path.found.bounces));
+        let other_place = chart.place_in([column, row], DVec2::new(x, y));
+        let other = chart.point(sphere, other_place);
+        let ray = &path.ray;
+        let from = &spheres[own];
+        let outward = match from.pole {
+            Some(pole) => (pole + ray.offset / from.radius).normalize(),
+            None => ray.offset.normalize(),
+        };
+        let normal = outward * outward.dot(ray.direction).signum();
+        // The pdfs of both points on the chart, but for the same factor.
+        let area = chart.area(sphere, place);
+        let w = density(normal, ray.direction, vertex.normal, hit.t, area);
+        let way = ((sphere.anchor - from.anchor) + other.offset) - ray.offset;
+        let distance = way.length();
+        let direction = way / distance;
+        let area = chart.area(sphere, other_place);
+        let seen = density(normal, direction, other.normal, distance, area);
+        let mut w_other = 0.0;
+        if seen > 0.0 && distance >= chart.cell_size(sphere, other_place) {
+            let ray = Ray {
+                direction,
+                ..ray.clone()
+            };
+            let first = closest_hit(&ray, spheres);
+            path.found.rays += 1;
+            let met = first.is_some_and(|first| first.index == hit.index && !first.inside);
+            w_other = if met { seen } else { 0.0 };
+        }
+        // Where rounding leaves neither, y counts.
+        let phi = match w + w_other > 0.0 {
+            true => (w - w_other) / (w + w_other),
+            false => 1.0,
+        };
+        let largest = path.throughput.abs().max_element();
+        let alive = (phi.abs() * largest / corrected).min(1.0);
+        if u >= corrected * alive {
+            return true;
+        }
+        path.throughput *= phi / (corrected * alive);
+        path.plain = true;
+        path.other = Some(Begin {
+            ray: begin_at(&path.ray, &other, sphere),
+            throughput: -path.throughput,
+            bounces: path.found.bounces,
+            sphere: hit.index,
+        });
+        false
+    }
+
+    /// The values of all cells for the batch of the samples from `first` on, of so many: a mean over paths of its own;
+    /// and their rays.
+    #[must_use]
+    pub fn pilot(&self, cells: &Cells, first: u64, batch: u64) -> (Vec<DVec3>, u64) {
+        let samples = cells.samples(batch);
+        let numbers = 0..cells.used().len() as u32;
+        let value = |number: u32| {
+            let mut found = (DVec3::ZERO, 0);
+            for sample in 0..samples {
+                let path = self.reflected(cells, number, first, sample, samples);
+                found.0 += path.radiance / f64::from(samples);
+                found.1 += u64::from(path.rays);
+            }
+            found
+        };
+        let values: Vec<(DVec3, u64)> = numbers.into_par_iter().map(value).collect();
+        let rays = values.iter().map(|(_, rays)| rays).sum();
+        (values.into_iter().map(|(value, _)| value).collect(), rays)
+    }
+
+    /// One sample of what a cell reflects.
+    fn reflected(
+        &self,
+        cells: &Cells,
+        number: u32,
+        first: u64,
+        sample: u32,
+        samples: u32,
+    ) -> PathResult {
+        let stream = pilot_words(self.settings.seed, (first >> 32) as u32);
+        let key = sample_key(stream, [number, 0], first as u32);
+        let random = |dimension| sobol4(key, dimension, sample, samples - 1);
+        let Cell {
+            sphere: index,
+            row,
+            column,
+        } = cells.used()[number as usize];
+        let index = usize::from(index);
+        let (chart, sphere) = (&cells.charts()[index], &self.placement.spheres[index]);
+        let [x, y, ..] = random(CAMERA);
+        let place = chart.place_in([column, row], DVec2::new(x, y));
+        let ray = begin_at(&Ray::in_vacuum(), &chart.point(sphere, place), sphere);
+        let mut path = Path::new(ray, 0.0);
+        path.plain = true;
+        path.begin_on(index);
+        self.follow(&mut path, &random, &mut |_, _| {});
+        path.found
+    }
+}
