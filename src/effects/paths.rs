@@ -75,6 +75,11 @@ pub(super) fn rows() -> Vec<Row> {
             "batch_sums",
             "BATCHES",
             "pilot",
+            "CORRECTED",
+            "chart_of",
+            "charts",
+            "CELLS",
+            "CELLS_WIDTH",
         ]),
     ]
 }

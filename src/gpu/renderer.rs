@@ -62,6 +62,14 @@ impl GpuRenderer {
     /// # Errors
     /// [`Error::Gpu`] if the image or the scene is beyond a limit of the device, or it fails.
     pub fn new(gpu: Gpu, job: &Job) -> Result<Self> {
+        Self::with_constants(gpu, job, &[])
+    }
+
+    /// The same with other values of the kernel's `override`s: for tests of what these do.
+    ///
+    /// # Errors
+    /// Those of [`new`](Self::new).
+    pub fn with_constants(gpu: Gpu, job: &Job, more: &[(&str, f64)]) -> Result<Self> {
         let (scene, settings) = (job.scene(), job.settings());
         let (placement, effects) = (job.placement(), job.effects());
         let kernel = link(Stage::Path, scene, placement, effects)?;
@@ -97,6 +105,7 @@ impl GpuRenderer {
         if let Integrator::Lecture { termination } = settings.integrator {
             constants.push(("LECTURE_TERMINATION", termination));
         }
+        constants.extend_from_slice(more);
         let render = program.pass(&gpu, "render", &constants)?;
         let cells = job.placement().cells();
         let cache = cells.map(|cells| Cache::new(&gpu, &program, &constants, cells));

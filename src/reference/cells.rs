@@ -16,7 +16,7 @@ use crate::placement::PlacedSphere;
 use crate::settings::pilot_words;
 
 /// The probability with which a value is corrected.
-pub const CORRECTED: f64 = 0.25;
+const CORRECTED: f64 = 0.25;
 
 /// The radiance cache for one batch of samples.
 #[derive(Clone, Copy, Debug)]
@@ -25,8 +25,6 @@ pub struct Cache<'a> {
     pub cells: &'a Cells,
     /// The mean of the radiance that each of those in use reflects, W/(sr m²).
     pub values: &'a [DVec3],
-    /// [`CORRECTED`]; another one for tests of what that does.
-    pub corrected: f64,
 }
 
 /// Where a part of a path begins.
@@ -126,8 +124,7 @@ impl PathTracer<'_> {
             return false;
         };
         path.receive(path.class, path.throughput * cache.values[number]);
-        let corrected = cache.corrected;
-        if u >= corrected {
+        if u >= CORRECTED {
             return true;
         }
 
@@ -166,11 +163,11 @@ impl PathTracer<'_> {
             false => 1.0,
         };
         let largest = path.throughput.abs().max_element();
-        let alive = (phi.abs() * largest / corrected).min(1.0);
-        if u >= corrected * alive {
+        let alive = (phi.abs() * largest / CORRECTED).min(1.0);
+        if u >= CORRECTED * alive {
             return true;
         }
-        path.throughput *= phi / (corrected * alive);
+        path.throughput *= phi / (CORRECTED * alive);
         path.plain = true;
         path.other = Some(Begin {
             ray: begin_at(&path.ray, &other, sphere),

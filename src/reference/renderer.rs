@@ -5,7 +5,7 @@ use std::ops::Range;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::cells::{CORRECTED, Cache};
+use super::cells::Cache;
 use super::path::{PathResult, PathTracer};
 use crate::cells::Cells;
 use crate::error::{Error, Result};
@@ -60,11 +60,7 @@ impl ReferenceRenderer {
         values: &[DVec3],
         state: &mut PixelState,
     ) {
-        let cache = |cells| Cache {
-            cells,
-            values,
-            corrected: CORRECTED,
-        };
+        let cache = |cells| Cache { cells, values };
         let tracer = PathTracer {
             cache: self.cells().map(cache),
             ..self.tracer()
