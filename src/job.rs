@@ -117,6 +117,10 @@ impl Job {
     #[must_use]
     pub fn with_effects(mut self, more: &[Effect], why: &str) -> Self {
         self.effects = self.effects.with(more, why);
+        if self.effects.has(Effect::RadianceCache) && self.cells().is_none() {
+            let none = Cells::none(self.placement.spheres.len());
+            self.placement = self.placement.with_cells(none);
+        }
         self
     }
 }

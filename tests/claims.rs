@@ -17,8 +17,8 @@ use gpu_trace::verify::{image_bits, settings};
 const SPP: u64 = 512;
 /// Two pairs.
 const SEEDS: u64 = 4;
-/// z-tests of the whole family, to be well over: two for each of 24 estimators.
-const TESTS: usize = 48;
+/// z-tests of the whole family, to be well over: two for each of 25 estimators.
+const TESTS: usize = 50;
 
 /// Gray, so that a channel tells all; dark enough for the lecture's estimator to have a finite fourth moment.
 fn gray() -> Scene {
@@ -57,17 +57,22 @@ fn estimators(scene: &Scene) -> Vec<Settings> {
             }
         }
     }
+    all.push(Settings {
+        radiance_cache: true,
+        ..settings(scene, 32, 24, SPP)
+    });
     assert!(2 * all.len() <= TESTS, "{} estimators", all.len());
     all
 }
 
 fn name(s: &Settings) -> String {
     format!(
-        "{} {} {}{}",
+        "{} {} {}{}{}",
         s.integrator.name(),
         s.light_sampling.name(),
         s.sampler.name(),
-        if s.adaptive { " adaptive" } else { "" }
+        if s.adaptive { " adaptive" } else { "" },
+        if s.radiance_cache { " cache" } else { "" },
     )
 }
 
@@ -121,7 +126,13 @@ fn excess(films: &[Film], share: f64) -> f64 {
 fn apart(a: &[Film], b: &[Film]) -> f64 {
     let total = |films: &[Film]| {
         let n = films.len() as f64;
-        let all = films.iter().flat_map(values);
+        let of_film = |film: &Film| {
+            let pixels = film.rect().pixels();
+            let sum: f64 = (0..pixels).map(|i| film.mean(i)[0]).sum();
+            let variance = film.variance_of_image_mean().expect("16 batches")[0];
+            [sum / pixels as f64, variance]
+        };
+        let all = films.iter().map(of_film);
         let [sum, variance] = all.fold([0.0; 2], |s, v| [s[0] + v[0], s[1] + v[1]]);
         [sum / n, variance / (n * n)]
     };

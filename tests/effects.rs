@@ -314,6 +314,7 @@ fn asking_for(set: &Set) -> (Scene, Settings) {
             false => LightSampling::Projected,
         },
         roulette: has(Effect::Roulette),
+        radiance_cache: has(Effect::RadianceCache),
         adaptive: has(Effect::Adaptive),
         classes: has(Effect::Classes),
         features: has(Effect::Features),

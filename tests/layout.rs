@@ -278,7 +278,7 @@ fn structs_of_the_radiance_cache_agree() {
     let kernel = kernel(Stage::Path, &["list", "sobol", "diffuse", "radiance_cache"]);
     let chart = host!(ChartRecord {
         first,
-        side,
+        cells,
         diffuse,
         width,
         across,

@@ -317,7 +317,8 @@ fn it_is_off_where_it_would_not_be_right() {
     };
     assert_eq!(why(&room, &|_| {}), None);
     assert_eq!(why(&lens, &|_| {}), None);
-    let changes: [(&dyn Fn(&mut Settings), &str); 8] = [
+    type Change<'a> = &'a dyn Fn(&mut Settings);
+    let changes: [(Change<'_>, &str); 8] = [
         (&|s| s.integrator = Integrator::Bsdf, "--integrator"),
         (&|s| s.sampler = Sampler::Independent, "--sampler"),
         (&|s| s.max_bounces = 63, "--max-bounces"),

@@ -69,6 +69,12 @@ impl Cells {
         }
     }
 
+    /// None at all, of so many spheres.
+    #[must_use]
+    pub fn none(spheres: usize) -> Self {
+        Self::new(vec![Chart::without_cells(false); spheres], &[], 0)
+    }
+
     /// The chart of each of the placement's spheres.
     #[must_use]
     pub fn charts(&self) -> &[Chart] {

@@ -1,9 +1,11 @@
 //! Where the radiance cache is not used, and why.
 
+use glam::DVec3;
+
 use crate::materials::diffuse;
 use crate::placement::{PlacedSphere, Placement, Side};
 use crate::sampler::Sampler;
-use crate::scene::Scene;
+use crate::scene::{Environment, Scene};
 use crate::settings::{DEFAULT_MAX_BOUNCES, GeometryChoice, Integrator, Offset, Settings};
 
 /// Most spheres of a scene with a cache: beyond, cells would be more than what they save.
@@ -24,7 +26,11 @@ pub fn obstacle(scene: &Scene, placement: &Placement, settings: &Settings) -> Op
         let spheres = placement.spheres.iter();
         spheres.map(|sphere| &scene.materials[sphere.material])
     };
-    let lit = kinds().any(|material| material.emission != glam::DVec3::ZERO);
+    let sky = scene
+        .environment
+        .as_ref()
+        .filter(|e| e.brightest() > 0.0 && !placement.enclosed);
+    let has_sky = sky.and_then(Environment::sky).is_some();
     let obstacles = [
         (
             settings.integrator != Integrator::Path,
@@ -60,7 +66,7 @@ pub fn obstacle(scene: &Scene, placement: &Placement, settings: &Settings) -> Op
             "dispersion",
         ),
         (
-            kinds().any(|material| material.kind.absorption() != glam::DVec3::ZERO),
+            kinds().any(|material| material.kind.absorption() != DVec3::ZERO),
             "absorption",
         ),
         (placement.media.levels > 0, "dielectrics that share points"),
@@ -77,7 +83,10 @@ pub fn obstacle(scene: &Scene, placement: &Placement, settings: &Settings) -> Op
             !placement.spheres.iter().any(|s| is_diffuse(scene, s)),
             "no sphere is diffuse",
         ),
-        (!lit && scene.environment.is_none(), "there is no light"),
+        (
+            placement.lights.table.is_empty() && !has_sky,
+            "there is no lamp, nor an image around all",
+        ),
     ];
     let first = obstacles.into_iter().find(|(is, _)| *is);
     first.map(|(_, why)| why)

@@ -45,6 +45,7 @@ pub(super) fn rows() -> Vec<Row> {
             },
         )
         .needs([Effect::Sobol])
+        .needs([Effect::Mis])
         .needs(diffuse())
         .excludes([
             Effect::Lecture,

@@ -274,7 +274,7 @@ pub const CELLS_WIDTH: u32 = 1024;
 #[expect(missing_docs, reason = "the members are those of the kernel's struct")]
 pub struct ChartRecord {
     pub first: u32,
-    pub side: u32,
+    pub cells: u32,
     pub diffuse: u32,
     pub width: f32,
     pub across: [f32; 3],
@@ -290,7 +290,7 @@ impl ChartRecord {
         let [across, down] = chart.axes.map(|axis| axis.as_vec3().to_array());
         Self {
             first: chart.first,
-            side: chart.side,
+            cells: chart.side,
             diffuse: u32::from(chart.diffuse),
             width: chart.width.unwrap_or(0.0) as f32,
             across,

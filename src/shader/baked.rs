@@ -247,7 +247,7 @@ fn chart_of(text: &mut String, placement: &Placement) {
     let each = |value: &dyn Fn(&Chart) -> String| charts.iter().map(value).collect::<Vec<_>>();
     *text += "fn chart_of(index: u32) -> Chart {\nvar chart: Chart;\n";
     choose(text, "chart.first", &each(&|c| format!("{}u", c.first)));
-    choose(text, "chart.side", &each(&|c| format!("{}u", c.side)));
+    choose(text, "chart.cells", &each(&|c| format!("{}u", c.side)));
     choose(
         text,
         "chart.diffuse",

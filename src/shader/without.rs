@@ -97,6 +97,11 @@ fn holds(condition: &str, off: &str) -> Option<bool> {
 /// Words with which a node begins that ends with its braces.
 const BLOCKS: [&str; 7] = ["fn", "struct", "if", "for", "while", "loop", "{"];
 
+/// Whether a declaration's text so far has a bracket of a type or an address space.
+fn is_typed(text: &str) -> bool {
+    text.contains("array<") || text.contains("var<")
+}
+
 /// The length of the declaration, statement, member or parameter with which `text` begins; `is_block`: its first word
 /// is gone, and was one of the [`BLOCKS`].
 fn end_of_node(text: &str, is_block: bool) -> usize {
@@ -123,9 +128,14 @@ fn end_of_node(text: &str, is_block: bool) -> usize {
             continue;
         }
         match c {
-            // Of types: nothing else in the sources has a comma between such brackets.
-            '<' if text[..at].ends_with("array") => depth += 1,
-            '>' if depth > 0 && text[..at].contains("array<") && !is_block => depth -= 1,
+            // Of types and address spaces: nothing else in the sources has a comma between such brackets.
+            '<' if ["array", "var"]
+                .iter()
+                .any(|word| text[..at].ends_with(word)) =>
+            {
+                depth += 1
+            }
+            '>' if depth > 0 && is_typed(&text[..at]) && !is_block => depth -= 1,
             '(' | '[' | '{' => depth += 1,
             ')' | ']' | '}' if depth == 0 => return at,
             ')' | ']' => depth -= 1,
