@@ -16,7 +16,7 @@ use gpu_trace::settings::{GeometryChoice, Integrator, Offset, Settings, View};
 use gpu_trace::statistics::mean_and_error;
 use gpu_trace::verify::{Random, settings};
 
-use crate::common::{gpu, gpu_renderer, job, scene, scene_file};
+use crate::common::{cpu_renderer, gpu, gpu_renderer, job, scene, scene_file};
 use crate::thorough::thorough;
 
 /// With the cache.
@@ -227,16 +227,17 @@ fn scenes() -> Vec<(&'static str, Scene, u64, bool)> {
         ],
         true => vec![
             ("corner", corner(), 100, true),
-            ("lecture", file("lecture"), 100, true),
-            ("glass", file("glass"), 100, true),
+            ("lecture", file("lecture"), 100, false),
+            ("glass", file("glass"), 100, false),
             ("lecture-reflective", file("lecture-reflective"), 60, false),
             ("three-lamps", file("tests/three-lamps"), 60, false),
         ],
     }
 }
 
-/// What the mean of the squares may be: blocks have noise in common, which makes it vary.
-const APART: f64 = 1.6;
+/// What the mean of the squares may be. Blocks have noise in common: in `corner` they vary as some 18 independent ones
+/// would, so that it has a standard deviation of a third. Without corrections it is 19 there with 8 seeds, 205 with 100.
+const APART: f64 = 2.2;
 
 #[test]
 fn it_changes_no_mean() {
@@ -302,6 +303,38 @@ fn the_error_of_the_mean_is_that_of_the_batches() {
     assert!((said - 1.0).abs() < most, "{said}");
     // A companion: as if pixels were independent.
     assert!(independent > 1.0 + most, "{independent}");
+}
+
+/// The reference says the same of the image's mean, and parts of a render add up to the whole.
+#[test]
+fn the_error_of_the_mean_is_that_of_all_parts() {
+    let room = room();
+    let whole = cached(&room, 24, 24, 128);
+    let film = film_of(&mut gpu_renderer(&room, &whole), &whole);
+    let parts = [0..64, 64..128].map(|samples| {
+        let part = Settings {
+            samples,
+            ..whole.clone()
+        };
+        film_of(&mut gpu_renderer(&room, &part), &part)
+    });
+    let [first, rest] = parts;
+    let mut joined = first.clone();
+    joined.join(&rest);
+    let outcome = render_quietly(&mut cpu_renderer(&room, &whole), &whole);
+    let reference = outcome.unwrap_or_else(|e| panic!("{e}")).film;
+    let errors = [&film, &joined, &reference].map(|film| mean(film).map(|[_, error]| error));
+    let near = |a: [f64; 3], b: [f64; 3], most: f64| {
+        std::iter::zip(a, b).all(|(a, b)| (a / b - 1.0).abs() < most)
+    };
+    assert!(near(errors[1], errors[0], 1.0e-9), "{errors:?}");
+    assert!(near(errors[2], errors[0], 1.0e-2), "{errors:?}");
+    // A companion: a part has another error.
+    assert!(!near(
+        mean(&rest).map(|[_, error]| error),
+        errors[0],
+        1.0e-2
+    ));
 }
 
 #[test]

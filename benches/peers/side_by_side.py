@@ -292,6 +292,7 @@ def main():
     parser.add_argument("--reference-spp", type=int, default=4096)
     parser.add_argument("--error", type=float, default=0.02, help="that time is compared to")
     parser.add_argument("--samplers", default="independent,multijitter,ldsampler", help="Mitsuba's")
+    parser.add_argument("--scale", type=int, default=1, help="times as many pixels a side")
     parser.add_argument("--quick", action="store_true", help="small images, few samples")
     parser.add_argument("--cache", type=pathlib.Path, default=ROOT / "target/peers/references")
     options = parser.parse_args()
@@ -307,6 +308,9 @@ def main():
         options.reference_spp, options.error = 256, 0.1
         for scene in SCENES:
             scene.width, scene.height = scene.width // 2, scene.height // 2
+
+    for scene in SCENES:
+        scene.width, scene.height = options.scale * scene.width, options.scale * scene.height
 
     compiled = start()
     binary = str(pathlib.Path(options.binary).resolve())
@@ -324,10 +328,12 @@ def main():
             own = Own(binary, scene, folder)
             plain = Own(binary, scene, folder, "--sampler", "independent")
             without = Own(binary, scene, folder, "--integrator", "bsdf")
+            cache = Own(binary, scene, folder, "--radiance-cache", "on")
             renderers = {
                 **peers,
                 "gpu-trace, independent": plain,
                 "gpu-trace, no lamp sampling": without,
+                "gpu-trace, radiance cache": cache,
                 "gpu-trace": own,
             }
             compare(own, scene, renderers, options)

@@ -409,8 +409,9 @@ impl RenderArgs {
     /// Those of [`settings`](Self::settings).
     pub(super) fn decide(&self, scene: &Scene) -> Result<(Settings, Option<Choice>)> {
         let settings = self.settings_but_integrator(scene)?;
-        // Who says how lights are sampled wants them to be sampled.
-        if self.integrator != Estimator::Auto || self.light_sampling.is_some() {
+        // Who says how lights are sampled wants them to be sampled, and the radiance cache is that of `path`.
+        let is_path = self.light_sampling.is_some() || settings.radiance_cache;
+        if self.integrator != Estimator::Auto || is_path {
             return Ok((settings, None));
         }
         let choice = choose(scene, &settings)?;

@@ -86,8 +86,8 @@ struct PixelState {
     batches: f64,
     batch_mean: DVec3,
     tally: Tally,
-    /// Sums of the full batches, where the image's are asked for.
-    full: Option<Vec<DVec3>>,
+    /// Sum of the last full batch.
+    last_batch: DVec3,
 }
 
 impl PixelState {
@@ -124,9 +124,7 @@ impl PixelState {
             self.batches += 1.0;
             let delta = self.batch - self.batch_mean;
             self.batch_mean += delta / self.batches;
-            if let Some(full) = &mut self.full {
-                full.push(self.batch);
-            }
+            self.last_batch = self.batch;
             let m2 = delta * (self.batch - self.batch_mean);
             self.sums.m2 = (DVec3::from(self.sums.m2) + m2).to_array();
         }
@@ -159,7 +157,6 @@ impl Renderer for ReferenceRenderer {
         let width = crop.width as usize;
         let blank = PixelState {
             aovs: self.settings.has_aovs().then(Box::default),
-            full: self.cells().map(|_| Vec::new()),
             ..PixelState::default()
         };
         let mut state = vec![blank; crop.pixels()];
@@ -169,6 +166,7 @@ impl Renderer for ReferenceRenderer {
         let mut tally = Tally::default();
         let batch = self.settings.sampler.batch(samples.start);
         let (mut start, mut values, mut of_batch) = (samples.start, Vec::new(), None);
+        let mut image = Vec::new();
         while start < samples.end {
             if let Some(cells) = self.cells()
                 && of_batch != Some(start / batch)
@@ -198,6 +196,11 @@ impl Renderer for ReferenceRenderer {
             });
             let paths = all * (end - start);
             start = end;
+            let ends_batch = start.is_multiple_of(batch) && start >= samples.start + batch;
+            if self.cells().is_some() && ends_batch {
+                let sum: DVec3 = state.iter().map(|pixel| pixel.last_batch).sum();
+                image.push(sum.to_array());
+            }
             if !control.proceed(paths) {
                 break;
             }
@@ -206,23 +209,8 @@ impl Renderer for ReferenceRenderer {
             pixel.end_batch(false);
             tally.add(&pixel.tally);
         }
-        let mut image = vec![
-            DVec3::ZERO;
-            state
-                .iter()
-                .filter_map(|s| s.full.as_ref())
-                .map(Vec::len)
-                .max()
-                .unwrap_or(0)
-        ];
-        for full in state.iter().filter_map(|s| s.full.as_ref()) {
-            image
-                .iter_mut()
-                .zip(full)
-                .for_each(|(sum, more)| *sum += *more);
-        }
         Ok(Window {
-            image: image.into_iter().map(|sum| sum.to_array()).collect(),
+            image,
             rect: crop,
             samples: samples.start..start,
             batch: self.settings.sampler.batch(samples.start),
