@@ -1,4 +1,4 @@
-//! Which estimator pays on a scene: what `--integrator auto` takes.
+//! Which estimator pays on a scene: what `--integrator auto` and `--radiance-cache auto` take.
 //!
 //! Sampling lights costs time at every vertex, and is worth it where it takes out more variance than that. A pilot of its
 //! own, of the f64 reference on a small image with a fixed seed, estimates the variance of a sample with and without,
@@ -6,19 +6,64 @@
 //! seed, and in every part of a render. As Grittmann et al., "Efficiency-Aware Multiple Importance Sampling" (SIGGRAPH
 //! 2022), choose among techniques; here the kernel then holds what was chosen alone.
 
+use glam::DVec3;
+
+use crate::cells::obstacle;
 use crate::effects::Effect;
 use crate::error::Result;
 use crate::film::{Estimate, Film, LEAST_SAMPLES};
 use crate::job::{Job, prepare};
+use crate::placement::Placement;
+use crate::reference::cells::Cache;
 use crate::reference::path::PathTracer;
 use crate::reference::renderer::ReferenceRenderer;
+use crate::reference::survey::survey;
 use crate::render::render_quietly;
+use crate::sampler::Sampler;
 use crate::scene::Scene;
 use crate::settings::{GeometryChoice, Integrator, Rect, Settings};
 use crate::variance::VarianceClass;
 
-/// The estimators to choose from, the one that is taken in doubt first.
-const CANDIDATES: [Integrator; 2] = [Integrator::Path, Integrator::Bsdf];
+/// An estimator to choose from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Candidate {
+    /// `path`: the one that is taken in doubt.
+    Path,
+    /// `bsdf`.
+    Bsdf,
+    /// `path` with the radiance cache.
+    RadianceCache,
+}
+
+impl Candidate {
+    /// The estimator.
+    #[must_use]
+    pub fn integrator(self) -> Integrator {
+        match self {
+            Self::Path | Self::RadianceCache => Integrator::Path,
+            Self::Bsdf => Integrator::Bsdf,
+        }
+    }
+
+    /// Its name in tables and files.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::RadianceCache => "path, cache",
+            other => other.integrator().name(),
+        }
+    }
+
+    /// The settings with it.
+    #[must_use]
+    pub fn settings(self, settings: &Settings) -> Settings {
+        Settings {
+            integrator: self.integrator(),
+            radiance_cache: self == Self::RadianceCache,
+            ..settings.clone()
+        }
+    }
+}
 
 /// Samples a pixel of a pilot: from so many on an error is known.
 const SAMPLES: u64 = LEAST_SAMPLES;
@@ -37,6 +82,13 @@ const COUNTED: u32 = 256;
 /// tree. Measured (`benches/RESULTS.md`); devices differ, but a choice must not.
 const CONNECTION: [f64; 2] = [1.0, 2.0];
 
+/// What it costs to ask a cell for its value and to correct that at times, beside the rays. Measured on two scenes
+/// (`benches/RESULTS.md`).
+const LOOKUP: f64 = 3.5;
+
+/// Samples of the batch for which pilots of the radiance cache are counted: the second length.
+const BATCH: u64 = 16;
+
 /// Standard errors of their difference by which the means of two unbiased pilots may be apart.
 const APART: f64 = 3.5;
 
@@ -44,7 +96,7 @@ const APART: f64 = 3.5;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trial {
     /// The estimator.
-    pub integrator: Integrator,
+    pub candidate: Candidate,
     /// Variance of a sample over the square of the pixel, averaged over the image as the error is
     /// ([`Estimate::error`]); infinite where the pilot was black.
     pub relative_variance: f64,
@@ -52,6 +104,8 @@ pub struct Trial {
     pub rays: f64,
     /// Connections with lights a path.
     pub connections: f64,
+    /// Cells a path that are asked for their values.
+    pub lookups: f64,
     /// What a path costs, in units of a ray's.
     pub cost: f64,
     /// Why the variance may be another one than the pilot says; `path` alone is chosen with a doubt.
@@ -70,7 +124,7 @@ impl Trial {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Choice {
     /// The one chosen.
-    pub integrator: Integrator,
+    pub candidate: Candidate,
     /// What was found of each; empty where the scene left no choice.
     pub trials: Vec<Trial>,
     /// Why there was no pilot, if there was none.
@@ -80,7 +134,7 @@ pub struct Choice {
 impl Choice {
     fn without_pilot(why: &'static str) -> Self {
         Self {
-            integrator: CANDIDATES[0],
+            candidate: Candidate::Path,
             trials: Vec::new(),
             without_pilot: Some(why),
         }
@@ -88,11 +142,12 @@ impl Choice {
 }
 
 /// Chooses for a scene as `settings` would render it: a function of the scene, the image's size, the sampler, and how paths
-/// leave surfaces and where they end. Not of the geometry's form, which changes no image.
+/// leave surfaces and where they end. Not of the geometry's form, which changes no image. `rivals`: what may be taken in the
+/// place of `path`.
 ///
 /// # Errors
 /// Those of [`prepare`], and of the reference's threads.
-pub fn choose(scene: &Scene, settings: &Settings) -> Result<Choice> {
+pub fn choose(scene: &Scene, settings: &Settings, rivals: &[Candidate]) -> Result<Choice> {
     let spheres = scene.spheres.len() as f64;
     let affordable = |rays: f64| TESTS / (spheres * rays * (2 * SAMPLES) as f64);
     let too_large = "there are more spheres than a pilot can look at";
@@ -101,32 +156,53 @@ pub fn choose(scene: &Scene, settings: &Settings) -> Result<Choice> {
         return Ok(Choice::without_pilot(too_large));
     }
     let job = |integrator, pixels: f64| prepare(scene, &pilot(settings, integrator, pixels));
-    let whole = job(CANDIDATES[0], PIXELS[1])?;
+    let whole = job(Integrator::Path, PIXELS[1])?;
     if !whole.effects().samples_light() {
         return Ok(Choice::without_pilot("nothing here is sampled as a light"));
     }
-    let [rays, connections] = counts(&whole);
+    let counted = counts(&whole, None);
+    let Counts {
+        rays, connections, ..
+    } = counted;
     let pixels = affordable(rays + connections).min(PIXELS[1]);
     if pixels < PIXELS[0] {
         return Ok(Choice::without_pilot(too_large));
     }
     let per_connection = CONNECTION[usize::from(whole.effects().has(Effect::Bvh))];
+    let cost = |c: &Counts| c.rays + per_connection * c.connections + LOOKUP * c.lookups;
     let mut trials = Vec::new();
     let mut films: Vec<Film> = Vec::new();
-    for integrator in CANDIDATES {
-        let job = job(integrator, pixels)?;
-        let mut renderer = ReferenceRenderer::new(&job, 0)?;
-        let film = render_quietly(&mut renderer, job.settings())?.film;
-        let connections = match integrator {
-            Integrator::Path => connections,
-            _ => 0.0,
+    for &candidate in std::iter::once(&Candidate::Path).chain(rivals) {
+        let job = job(candidate.integrator(), pixels)?;
+        let (job, values) = match candidate {
+            Candidate::RadianceCache => match with_cells(scene, settings, job) {
+                None => continue,
+                Some((job, values)) => (job, Some(values)),
+            },
+            _ => (job, None),
         };
+        let counts = match candidate {
+            Candidate::Path => counted,
+            Candidate::Bsdf => Counts {
+                connections: 0.0,
+                ..counted
+            },
+            Candidate::RadianceCache => counts(&job, values.as_deref()),
+        };
+        // A pilot's paths are plain ones.
+        let pilots = job.cells().map_or(0.0, |cells| cells.share(BATCH)) * cost(&counted);
+        let mut renderer = ReferenceRenderer::new(&job, 0)?;
+        if let Some(values) = values {
+            renderer = renderer.with_values(values);
+        }
+        let film = render_quietly(&mut renderer, job.settings())?.film;
         trials.push(Trial {
-            integrator,
+            candidate,
             relative_variance: relative_variance(&film),
-            rays,
-            connections,
-            cost: rays + per_connection * connections,
+            rays: counts.rays,
+            connections: counts.connections,
+            lookups: counts.lookups,
+            cost: cost(&counts) + pilots,
             doubt: doubt(&job, &film, films.first()),
         });
         films.push(film);
@@ -140,7 +216,7 @@ pub fn choose(scene: &Scene, settings: &Settings) -> Result<Choice> {
         }
     });
     Ok(Choice {
-        integrator: best.integrator,
+        candidate: best.candidate,
         trials,
         without_pilot: None,
     })
@@ -163,6 +239,7 @@ fn pilot(settings: &Settings, integrator: Integrator, pixels: f64) -> Settings {
         samples: 0..SAMPLES,
         seed: 0,
         integrator,
+        radiance_cache: false,
         geometry: GeometryChoice::Auto,
         view: None,
         adaptive: false,
@@ -174,25 +251,59 @@ fn pilot(settings: &Settings, integrator: Integrator, pixels: f64) -> Settings {
     }
 }
 
-/// Rays and connections of a path, in the mean over paths all over the image.
-fn counts(job: &Job) -> [f64; 2] {
+/// The job of a pilot with the cells that the image as `settings` have it would use, and values for them: the same for all
+/// batches, since what they add to the variance is little, and they are most of what a pilot takes. `None` where there
+/// is no radiance cache.
+fn with_cells(scene: &Scene, settings: &Settings, job: Job) -> Option<(Job, Vec<DVec3>)> {
+    let settings = Candidate::RadianceCache.settings(settings);
+    let placement = Placement::new(scene, settings.width, settings.height);
+    if obstacle(scene, &placement, &settings).is_some() {
+        return None;
+    }
+    let cells = survey(scene, &placement, &settings);
+    let tracer = PathTracer::new(job.scene(), job.placement(), job.settings());
+    let (values, _) = tracer.pilot(&cells, 0, Sampler::Sobol.batch(0));
+    Some((job.with_cells(cells), values))
+}
+
+/// What a path takes, in the mean.
+#[derive(Clone, Copy, Debug, Default)]
+struct Counts {
+    rays: f64,
+    connections: f64,
+    lookups: f64,
+}
+
+/// What paths all over the image take; `values`: of the job's cells.
+fn counts(job: &Job, values: Option<&[DVec3]>) -> Counts {
     let settings = job.settings();
-    let tracer = PathTracer::new(job.scene(), job.placement(), settings);
+    let tracer = PathTracer {
+        cache: job
+            .cells()
+            .zip(values)
+            .map(|(cells, values)| Cache { cells, values }),
+        ..PathTracer::new(job.scene(), job.placement(), settings)
+    };
     let pixels = settings.crop.pixels() as u32;
     let spheres = job.scene().spheres.len() as f64;
-    let (mut sums, mut traced) = ([0.0; 2], 0.0);
+    let (mut sums, mut traced) = (Counts::default(), 0.0);
     for i in 0..COUNTED {
         // Paths that never end, as without roulette, are few enough to say that a pilot would take too long.
-        if (sums[0] + sums[1]) * spheres > TESTS {
+        if (sums.rays + sums.connections) * spheres > TESTS {
             break;
         }
         traced += 1.0;
         let pixel = (u64::from(i) * u64::from(pixels) / u64::from(COUNTED)) as u32;
         let path = tracer.trace([pixel % settings.width, pixel / settings.width], 0);
-        sums[0] += f64::from(path.rays - path.shadow_rays);
-        sums[1] += f64::from(path.connections);
+        sums.rays += f64::from(path.rays - path.shadow_rays);
+        sums.connections += f64::from(path.connections);
+        sums.lookups += f64::from(path.lookups);
     }
-    sums.map(|sum| sum / traced)
+    Counts {
+        rays: sums.rays / traced,
+        connections: sums.connections / traced,
+        lookups: sums.lookups / traced,
+    }
 }
 
 fn relative_variance(film: &Film) -> f64 {

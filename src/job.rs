@@ -112,6 +112,13 @@ impl Job {
         Claims::of(&self.settings, self.variance.class, self.cells().is_some())
     }
 
+    /// The same with a radiance cache of these cells, whatever its settings.
+    #[must_use]
+    pub(crate) fn with_cells(mut self, cells: Cells) -> Self {
+        self.placement = self.placement.with_cells(cells);
+        self
+    }
+
     /// The same with effects in the kernel that nothing asks for, to measure what they cost; `why` is the reason
     /// given for them.
     #[must_use]

@@ -2,13 +2,13 @@
 
 use crate::cli_support::{Folder, holds};
 use crate::common::{render_gpu, scene, scene_file};
-use gpu_trace::choice::{Choice, choose};
+use gpu_trace::choice::{Candidate, Choice, choose};
 use gpu_trace::film::Estimate;
 use gpu_trace::scene::Scene;
 use gpu_trace::settings::{GeometryChoice, Integrator, Rect, Settings};
 
 fn chosen(scene: &Scene) -> Choice {
-    choose(scene, &Settings::for_scene(scene)).unwrap_or_else(|e| panic!("{e}"))
+    choose(scene, &Settings::for_scene(scene), &[Candidate::Bsdf]).unwrap_or_else(|e| panic!("{e}"))
 }
 
 fn built_in(name: &str) -> Scene {
@@ -24,7 +24,11 @@ fn what_pays_is_chosen() {
         ("field", Integrator::Bsdf),
     ] {
         let choice = chosen(&built_in(name));
-        assert_eq!(choice.integrator, integrator, "{name}: {choice:?}");
+        assert_eq!(
+            choice.candidate.integrator(),
+            integrator,
+            "{name}: {choice:?}"
+        );
         let [path, bsdf] = &choice.trials[..] else {
             panic!("{name}: {choice:?}");
         };
@@ -35,7 +39,7 @@ fn what_pays_is_chosen() {
     // Nothing to choose.
     let furnace = chosen(&built_in("tests/furnace"));
     assert!(furnace.trials.is_empty() && furnace.without_pilot.is_some());
-    assert_eq!(furnace.integrator, Integrator::Path);
+    assert_eq!(furnace.candidate, Candidate::Path);
 }
 
 #[test]
@@ -55,7 +59,7 @@ fn a_choice_is_a_function_of_the_scene_and_the_size() {
         geometry: GeometryChoice::List,
         ..settings.clone()
     };
-    let found = |settings| choose(&scene, settings).expect("a choice");
+    let found = |settings| choose(&scene, settings, &[Candidate::Bsdf]).expect("a choice");
     assert_eq!(found(&settings), found(&other));
     // Companion: figures of another size are other ones.
     let wider = Settings {
@@ -82,7 +86,7 @@ fn figures_are_those_of_renders() {
                 },
                 samples: 0..64,
                 seed: 1,
-                integrator: trial.integrator,
+                integrator: trial.candidate.integrator(),
                 ..Settings::for_scene(&scene)
             };
             let film = render_gpu(&scene, &settings);
@@ -143,11 +147,11 @@ fn a_pilot_that_misses_light_is_not_believed() {
     assert!(bsdf.effort() < choice.trials[0].effort(), "{choice:?}");
     let doubt = bsdf.doubt.as_deref().unwrap_or_default();
     assert!(doubt.contains("missed light"), "{choice:?}");
-    assert_eq!(choice.integrator, Integrator::Path);
+    assert_eq!(choice.candidate.integrator(), Integrator::Path);
     // Companion: where the lamp is nothing beside the sky, it is not worth the connections.
     let choice = chosen(&far_lamp(1.0));
     assert_eq!(choice.trials[1].doubt, None, "{choice:?}");
-    assert_eq!(choice.integrator, Integrator::Bsdf);
+    assert_eq!(choice.candidate.integrator(), Integrator::Bsdf);
 }
 
 #[test]
@@ -160,7 +164,7 @@ fn a_pilot_has_a_limit() {
         many.spheres.push(ball);
     }
     let choice = chosen(&many);
-    assert_eq!(choice.integrator, Integrator::Path);
+    assert_eq!(choice.candidate.integrator(), Integrator::Path);
     let why = choice.without_pilot.unwrap_or_default();
     assert!(why.contains("more spheres"), "{choice:?}");
 }
@@ -169,7 +173,7 @@ fn a_pilot_has_a_limit() {
 fn the_command_line_says_what_is_chosen() {
     let folder = Folder::new();
     let said = folder.ok("effects field");
-    holds(&said, &["--integrator auto is bsdf here", "effort"]);
+    holds(&said, &["What pays here is bsdf", "effort"]);
     let json: serde_json::Value =
         serde_json::from_str(&folder.ok("effects field --json")).expect("JSON");
     assert_eq!(json["integrator"], "bsdf");
@@ -186,4 +190,32 @@ fn the_command_line_says_what_is_chosen() {
     folder.ok("field --size 32x18 --spp 4 --stats s.json -o f.png");
     let stats: serde_json::Value = serde_json::from_slice(&folder.read("s.json")).expect("JSON");
     assert_eq!(stats["integrator"], "bsdf");
+}
+
+/// Rooms gain by the radiance cache, a ball under a lamp does not; figures are those of renders.
+#[test]
+fn the_radiance_cache_is_taken_where_it_pays() {
+    let rivals = [Candidate::Bsdf, Candidate::RadianceCache];
+    for (name, candidate) in [
+        ("lecture", Candidate::RadianceCache),
+        ("glass", Candidate::RadianceCache),
+        ("tests/mirror-ball", Candidate::Path),
+        ("tests/lamps", Candidate::Path),
+    ] {
+        let scene = built_in(name);
+        let settings = Settings {
+            width: 320,
+            height: 320,
+            max_bounces: 64,
+            ..Settings::for_scene(&scene)
+        };
+        let choice = choose(&scene, &settings, &rivals).expect("a choice");
+        eprintln!("{name}: {choice:?}");
+        assert_eq!(choice.candidate, candidate, "{name}: {choice:?}");
+        assert_eq!(choice.trials.len(), 3, "{name}");
+    }
+    // Where there can be none, the others are chosen from.
+    let field = built_in("field");
+    let choice = choose(&field, &Settings::for_scene(&field), &rivals).expect("a choice");
+    assert_eq!(choice.trials.len(), 2, "{choice:?}");
 }

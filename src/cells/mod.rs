@@ -100,6 +100,13 @@ impl Cells {
         number.checked_sub(1).map(|number| number as usize)
     }
 
+    /// The paths of a pilot over those of the image, for a batch of so many samples a pixel.
+    #[must_use]
+    pub fn share(&self, batch: u64) -> f64 {
+        let paths = self.used.len() as f64 * f64::from(self.samples(batch));
+        paths / (self.pixels * batch) as f64
+    }
+
     /// The samples of each cell for a batch of so many samples a pixel.
     #[must_use]
     pub fn samples(&self, batch: u64) -> u32 {

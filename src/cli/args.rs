@@ -7,11 +7,11 @@ use std::time::Duration;
 use clap::{Args, Parser};
 use glam::DVec3;
 
-use super::choices::{self, Estimator, Wanted};
+use super::choices::{self, Caching, Estimator, Wanted};
 use super::fault::Fault;
 use super::values;
 use crate::backend::{BackendChoice, BackendKind};
-use crate::choice::{Choice, choose};
+use crate::choice::{Candidate, Choice, choose};
 use crate::error::{Error, Result};
 use crate::output::{Aov, ProgressMode};
 use crate::sampler::Sampler;
@@ -222,13 +222,13 @@ pub struct RenderArgs {
     pub max_bounces: Option<u32>,
     #[arg(
         long,
-        value_name = "on|off",
-        value_parser = choices::switch(),
+        value_name = "auto|on|off",
+        value_parser = choices::caching(),
         help_heading = "Light transport",
         hide_possible_values = true,
-        help = "Let diffuse surfaces reflect by values of cells, drawn anew for every scramble and corrected without bias [default: off]"
+        help = "Let diffuse surfaces reflect by values of cells, drawn anew for every scramble and corrected without bias; auto: where a pilot says that it pays [default: off]"
     )]
-    pub radiance_cache: Option<bool>,
+    pub radiance_cache: Option<Caching>,
     #[arg(
         long,
         value_name = "on|off",
@@ -409,16 +409,20 @@ impl RenderArgs {
     /// Those of [`settings`](Self::settings).
     pub(super) fn decide(&self, scene: &Scene) -> Result<(Settings, Option<Choice>)> {
         let settings = self.settings_but_integrator(scene)?;
+        let mut rivals = Vec::new();
         // Who says how lights are sampled wants them to be sampled, and the radiance cache is that of `path`.
         let is_path = self.light_sampling.is_some() || settings.radiance_cache;
-        if self.integrator != Estimator::Auto || is_path {
+        if self.integrator == Estimator::Auto && !is_path {
+            rivals.push(Candidate::Bsdf);
+        }
+        if self.radiance_cache == Some(Caching::Auto) && settings.integrator == Integrator::Path {
+            rivals.push(Candidate::RadianceCache);
+        }
+        if rivals.is_empty() {
             return Ok((settings, None));
         }
-        let choice = choose(scene, &settings)?;
-        let settings = Settings {
-            integrator: choice.integrator,
-            ..settings
-        };
+        let choice = choose(scene, &settings, &rivals)?;
+        let settings = choice.candidate.settings(&settings);
         Ok((settings, Some(choice)))
     }
 
@@ -451,7 +455,7 @@ impl RenderArgs {
             max_bounces: self.max_bounces.unwrap_or(settings.max_bounces),
             integrator: integrator.with_termination(termination),
             light_sampling: self.light_sampling.unwrap_or_default(),
-            radiance_cache: self.radiance_cache == Some(true),
+            radiance_cache: self.radiance_cache == Some(Caching::On),
             roulette: !integrator.is_lecture() && self.roulette != Some(false),
             sampler: self.sampler,
             geometry: self.geometry,

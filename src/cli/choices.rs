@@ -76,6 +76,39 @@ pub(super) fn estimator() -> impl TypedValueParser<Value = Estimator> {
     })
 }
 
+/// Whether there is to be a radiance cache.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Caching {
+    /// Where it pays on the scene ([`crate::choice`]).
+    Auto,
+    /// Wherever there can be one.
+    On,
+    /// No.
+    Off,
+}
+
+impl Caching {
+    const ALL: [Self; 3] = [Self::Auto, Self::On, Self::Off];
+
+    /// The word on the command line.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Auto => "auto",
+            Self::On => "on",
+            Self::Off => "off",
+        }
+    }
+}
+
+/// `auto`, `on` or `off`.
+pub(super) fn caching() -> impl TypedValueParser<Value = Caching> {
+    PossibleValuesParser::new(Caching::ALL.map(Caching::name)).map(|word| {
+        let named = Caching::ALL.into_iter().find(|c| c.name() == word);
+        named.unwrap_or(Caching::Off)
+    })
+}
+
 /// `auto`, or the name of what renders.
 pub(super) fn backend() -> impl TypedValueParser<Value = Wanted> {
     let kinds = BackendKind::ALL.iter().map(|kind| kind.name());

@@ -110,6 +110,7 @@ impl PathTracer<'_> {
         let Some(hit) = hit.filter(|hit| !hit.inside && charts[hit.index].side > 0) else {
             return false;
         };
+        path.found.lookups += 1;
         let (chart, sphere) = (&charts[hit.index], &spheres[hit.index]);
         let vertex = vertex_at(&path.ray, &hit, sphere);
         let place = chart.place(vertex.offset);

@@ -60,6 +60,8 @@ pub struct PathResult {
     pub shadow_rays: u32,
     /// Vertices at which a direction to a light was drawn.
     pub connections: u32,
+    /// Cells of the radiance cache that were asked for their values.
+    pub lookups: u32,
     /// Scattering events.
     pub bounces: u32,
     /// Throughput with which the bounce limit cut the path; zero if it did not.

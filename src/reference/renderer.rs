@@ -23,6 +23,8 @@ pub struct ReferenceRenderer {
     scene: Scene,
     placement: Placement,
     settings: Settings,
+    /// Of the cells, for all batches: else a pilot finds them for each.
+    values: Option<Vec<DVec3>>,
     threads: rayon::ThreadPool,
 }
 
@@ -40,8 +42,16 @@ impl ReferenceRenderer {
             scene: job.scene().clone(),
             placement: job.placement().clone(),
             settings: job.settings().clone(),
+            values: None,
             threads,
         })
+    }
+
+    /// The same with these values of the cells for all batches: for pilots that only ask what samples vary.
+    #[must_use]
+    pub(crate) fn with_values(mut self, values: Vec<DVec3>) -> Self {
+        self.values = Some(values);
+        self
     }
 
     fn cells(&self) -> Option<&Cells> {
@@ -169,6 +179,7 @@ impl Renderer for ReferenceRenderer {
         let mut image = Vec::new();
         while start < samples.end {
             if let Some(cells) = self.cells()
+                && self.values.is_none()
                 && of_batch != Some(start / batch)
             {
                 let pilot = || self.tracer().pilot(cells, start / batch * batch, batch);
@@ -190,7 +201,8 @@ impl Renderer for ReferenceRenderer {
                                 continue;
                             }
                             let pixel = [crop.x + x as u32, crop.y + y as u32];
-                            self.pixel(pixel, &(start..end), &values, state);
+                            let values = self.values.as_ref().unwrap_or(&values);
+                            self.pixel(pixel, &(start..end), values, state);
                         }
                     });
             });

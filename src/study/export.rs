@@ -49,7 +49,7 @@ impl Document<'_> {
 }
 
 /// The columns of `converge.csv`.
-const COLUMNS: [&str; 20] = [
+const COLUMNS: [&str; 21] = [
     "series",
     "integrator",
     "termination",
@@ -70,6 +70,7 @@ const COLUMNS: [&str; 20] = [
     "mse_measured",
     "mean_error",
     "estimated",
+    "radiance_cache",
 ];
 
 /// A row for each point of each run. Errors named `measured` have the reference's noise in them, the
@@ -92,7 +93,7 @@ pub fn csv(analysis: &Analysis, runs: &[Run], noise: Option<Noise>) -> io::Resul
 }
 
 /// The cells of one point, in the order of [`COLUMNS`].
-fn row(label: &str, run: &Run, point: &Point, noise: Noise) -> [String; 20] {
+fn row(label: &str, run: &Run, point: &Point, noise: Noise) -> [String; 21] {
     let key = &run.series;
     let square = point.relmse - noise.relmse;
     let scientific = |x: f64| format!("{x:e}");
@@ -119,5 +120,6 @@ fn row(label: &str, run: &Run, point: &Point, noise: Noise) -> [String; 20] {
         scientific(point.mse),
         scientific(point.bias),
         or_empty(point.estimated.map(scientific)),
+        if key.radiance_cache { "on" } else { "off" }.to_owned(),
     ]
 }

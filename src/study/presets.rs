@@ -24,6 +24,8 @@ pub struct Preset {
     pub backends: &'static [BackendKind],
     /// Ways to leave a surface.
     pub offsets: &'static [Offset],
+    /// Whether there is a radiance cache.
+    pub caches: &'static [bool],
     /// Whether the CPU renders without any nudge only: the truth of the others.
     pub exact_on_cpu: bool,
     /// What renders the reference.
@@ -45,7 +47,7 @@ const LECTURE: Integrator = Integrator::Lecture {
 };
 
 /// All of them.
-pub const PRESETS: [Preset; 3] = [
+pub const PRESETS: [Preset; 4] = [
     Preset {
         name: "cpu-gpu",
         title: "CPU against GPU",
@@ -55,6 +57,7 @@ pub const PRESETS: [Preset; 3] = [
         samplers: &[],
         backends: &[BackendKind::Gpu, BackendKind::Cpu],
         offsets: &[],
+        caches: &[],
         exact_on_cpu: false,
         reference: Some(BackendKind::Cpu),
         reference_spp: 4096,
@@ -78,6 +81,7 @@ pub const PRESETS: [Preset; 3] = [
             Offset::Out(1.0e-4),
             Offset::Ulp,
         ],
+        caches: &[],
         exact_on_cpu: true,
         reference: Some(BackendKind::Cpu),
         reference_spp: 4096,
@@ -95,6 +99,7 @@ pub const PRESETS: [Preset; 3] = [
         samplers: &[Sampler::Independent],
         backends: &[],
         offsets: &[],
+        caches: &[],
         exact_on_cpu: false,
         reference: None,
         reference_spp: 8192,
@@ -102,6 +107,24 @@ pub const PRESETS: [Preset; 3] = [
         spp: 4096,
         seeds: 8,
         shown: &[1, 32, 4096],
+    },
+    Preset {
+        name: "estimators",
+        title: "What each estimator costs",
+        about: "the lecture's estimator, BSDF sampling, light sampling, and the radiance cache",
+        scene: "lecture",
+        integrators: &[LECTURE, Integrator::Bsdf, Integrator::Path],
+        samplers: &[Sampler::Sobol],
+        backends: &[],
+        offsets: &[],
+        caches: &[false, true],
+        exact_on_cpu: false,
+        reference: None,
+        reference_spp: 8192,
+        side: 160,
+        spp: 1024,
+        seeds: 8,
+        shown: &[],
     },
 ];
 

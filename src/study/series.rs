@@ -20,6 +20,8 @@ pub struct Series {
     pub offset: Offset,
     /// The most scattering events of a path.
     pub max_bounces: u32,
+    /// Whether diffuse surfaces reflect by values of cells.
+    pub radiance_cache: bool,
 }
 
 /// A series and what is known of its variance beforehand.
@@ -46,6 +48,9 @@ pub struct Key {
     pub offset: String,
     /// The most scattering events of a path.
     pub max_bounces: u32,
+    /// Whether there was a radiance cache; files from before it was there do not say.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub radiance_cache: bool,
 }
 
 impl Series {
@@ -55,6 +60,7 @@ impl Series {
         Settings {
             seed,
             max_bounces: self.max_bounces,
+            radiance_cache: self.radiance_cache,
             integrator: self.integrator,
             sampler: self.sampler,
             offset: self.offset,
@@ -76,6 +82,7 @@ impl Series {
             backend: self.backend,
             offset: self.offset.to_string(),
             max_bounces: self.max_bounces,
+            radiance_cache: self.radiance_cache,
         }
     }
 
@@ -89,11 +96,13 @@ impl Series {
             backend,
             offset,
             max_bounces,
+            radiance_cache,
         } = self.key();
+        let cache = if radiance_cache { "-cache" } else { "" };
         let termination = termination.map_or_else(String::new, |p| format!("-{p:e}"));
         let offset = offset.replace([':', '+'], "");
         let backend = backend.name();
-        format!("{integrator}{termination}-{sampler}-{backend}-{offset}-{max_bounces}")
+        format!("{integrator}{termination}-{sampler}-{backend}-{offset}-{max_bounces}{cache}")
     }
 
     /// What decides the kernel: all but what renders, for the f64 twin changes with it.
@@ -106,9 +115,11 @@ impl Series {
             backend: _,
             offset,
             max_bounces,
+            radiance_cache,
         } = self.key();
+        let cache = if radiance_cache { " cache" } else { "" };
         let termination = termination.map_or_else(String::new, |p| format!(" {p}"));
-        format!("{integrator}{termination} {sampler} {offset} {max_bounces}")
+        format!("{integrator}{termination} {sampler} {offset} {max_bounces}{cache}")
     }
 
     /// The same paths in f64 without any nudge: what rounding and nudges are told by.
@@ -122,7 +133,7 @@ impl Series {
     }
 
     /// What tells series apart, in the order of labels; the usual offset needs no word.
-    fn parts(&self) -> [String; 5] {
+    fn parts(&self) -> [String; 6] {
         [
             self.integrator.name().into(),
             self.sampler.name().into(),
@@ -140,6 +151,10 @@ impl Series {
                 1 => "1 bounce".into(),
                 n => format!("{n} bounces"),
             },
+            match self.radiance_cache {
+                true => "radiance cache".into(),
+                false => String::new(),
+            },
         ]
     }
 }
@@ -147,13 +162,13 @@ impl Series {
 /// A short name for each series: only what differs between them.
 #[must_use]
 pub fn labels(series: &[Series]) -> Vec<String> {
-    let parts: Vec<[String; 5]> = series.iter().map(Series::parts).collect();
+    let parts: Vec<[String; 6]> = series.iter().map(Series::parts).collect();
     let differs = |i: usize| parts.iter().any(|p| p[i] != parts[0][i]);
-    let mut shown: Vec<usize> = (0..5).filter(|i| differs(*i)).collect();
+    let mut shown: Vec<usize> = (0..6).filter(|i| differs(*i)).collect();
     if shown.is_empty() {
         shown = vec![0, 1];
     }
-    let label = |p: &[String; 5]| {
+    let label = |p: &[String; 6]| {
         let words = shown.iter().map(|i| p[*i].as_str());
         let words: Vec<&str> = words.filter(|word| !word.is_empty()).collect();
         match words.is_empty() {
@@ -172,6 +187,7 @@ pub fn product(
     backends: &[BackendKind],
     offsets: &[Offset],
     max_bounces: &[u32],
+    caches: &[bool],
 ) -> Vec<Series> {
     let mut all = Vec::new();
     for &integrator in integrators {
@@ -179,13 +195,14 @@ pub fn product(
             for &backend in backends {
                 for &offset in offsets {
                     for &max_bounces in max_bounces {
-                        all.push(Series {
+                        all.extend(caches.iter().map(|&radiance_cache| Series {
                             integrator,
                             sampler,
                             backend,
                             offset,
                             max_bounces,
-                        });
+                            radiance_cache,
+                        }));
                     }
                 }
             }
@@ -205,6 +222,7 @@ mod tests {
             &[BackendKind::Gpu, BackendKind::Cpu],
             &[Offset::Exact],
             &[64],
+            &[false],
         )
     }
 
@@ -246,9 +264,13 @@ mod tests {
             integrator: Integrator::Lecture { termination: 0.5 },
             ..all[2]
         };
+        let cached = Series {
+            radiance_cache: true,
+            ..all[0]
+        };
         let mut slugs: Vec<String> = all
             .iter()
-            .chain([&nudged, &ended])
+            .chain([&nudged, &ended, &cached])
             .map(Series::slug)
             .collect();
         assert!(
@@ -257,6 +279,6 @@ mod tests {
         );
         slugs.sort();
         slugs.dedup();
-        assert_eq!(slugs.len(), 6);
+        assert_eq!(slugs.len(), 7);
     }
 }

@@ -312,6 +312,7 @@ mod tests {
                 backend: BackendKind::Cpu,
                 offset: "exact".into(),
                 max_bounces: 64,
+                radiance_cache: false,
             },
             seed: 0,
             complete,

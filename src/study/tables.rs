@@ -313,6 +313,7 @@ mod tests {
                 backend: BackendKind::Cpu,
                 offset: Offset::Exact,
                 max_bounces,
+                radiance_cache: false,
             },
             variance: VarianceClass::Finite,
         });

@@ -318,7 +318,10 @@ fn what_cannot_be_measured_is_refused_with_both_facts() {
     refused("--integrators bsdf --termination 0.1", &["lecture"]);
     refused("--integrators bsdf,fast", &["fast", "path"]);
     refused("--offsets out", &["out:1e-4"]);
-    refused("--study cheap", &["cpu-gpu, precision, lecture"]);
+    refused(
+        "--study cheap",
+        &["cpu-gpu, precision, lecture, estimators"],
+    );
     refused("--spp 0", &["2^48"]);
     refused("--device 0", &["--backends cpu uses none"]);
     refused("--seed 18446744073709551615", &["2^64 - 1"]);

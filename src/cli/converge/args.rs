@@ -41,7 +41,7 @@ pub(in crate::cli) struct ConvergeArgs {
     /// A scene file, or the name of a built-in scene [default: lecture].
     #[arg(value_name = "SCENE")]
     pub(super) scene: Option<String>,
-    /// A built-in study: cpu-gpu, precision or lecture; see below.
+    /// A built-in study: cpu-gpu, precision, lecture or estimators; see below.
     #[arg(long, value_name = "NAME", value_parser = study)]
     pub(super) study: Option<&'static str>,
 
@@ -87,6 +87,10 @@ pub(in crate::cli) struct ConvergeArgs {
         help_heading = "What is compared"
     )]
     pub(super) offsets: Vec<Offset>,
+    /// The radiance cache of path with sobol: on, off, or both, as in off,on [default: off].
+    #[arg(long, value_name = "LIST", value_parser = choices::switch(), value_delimiter = ',',
+          hide_possible_values = true, help_heading = "What is compared")]
+    pub(super) radiance_cache: Vec<bool>,
     /// Most scattering events of a path [default: the scene's, or 64].
     #[arg(long, value_name = "LIST", value_delimiter = ',',
           value_parser = clap::value_parser!(u32).range(0..=i64::from(MAX_BOUNCES)),

@@ -86,6 +86,16 @@ pub(super) fn plan(args: &ConvergeArgs, warnings: &mut Vec<String>) -> Result<Pl
     for series in series {
         let settings = series.settings(&base, args.seed);
         let job = prepare(&loaded.scene, &settings)?;
+        if let Some(why) = job.cache_obstacle() {
+            if args.radiance_cache.is_empty() {
+                warnings.push(format!("no radiance cache: {why}"));
+                continue;
+            }
+            return Err(Error::Usage(format!(
+                "--radiance-cache on: {} cannot have one: {why}",
+                loaded.name
+            )));
+        }
         if let Entry::Vacant(kernel) = kernels.entry(series.way()) {
             kernel.insert(kernel_hash(&job)?);
         }
@@ -253,12 +263,22 @@ fn series(
         Offset::Exact,
     );
     let bounces = or(args.max_bounces.clone(), None, base.max_bounces);
+    let caches = or(args.radiance_cache.clone(), preset.map(|p| p.caches), false);
     let exact_on_cpu = preset.is_some_and(|p| p.exact_on_cpu) && args.backends.is_empty();
     let mut all: Vec<Series> = Vec::new();
-    for series in product(&integrators, &samplers, backends, &offsets, &bounces) {
+    for series in product(
+        &integrators,
+        &samplers,
+        backends,
+        &offsets,
+        &bounces,
+        &caches,
+    ) {
         let left_out =
             exact_on_cpu && series.backend == BackendKind::Cpu && series.offset != Offset::Exact;
-        if !left_out && !all.contains(&series) {
+        // The cache is that of `path`, and of scrambles.
+        let is_other = series.integrator != Integrator::Path || series.sampler != Sampler::Sobol;
+        if !left_out && !(series.radiance_cache && is_other) && !all.contains(&series) {
             all.push(series);
         }
     }
@@ -316,6 +336,7 @@ fn own_reference(
         backend,
         offset: Offset::Exact,
         max_bounces: base.max_bounces.max(bounces.unwrap_or(0)),
+        radiance_cache: false,
     };
     let usual = match preset {
         Some(preset) if args.spp.is_none() => preset.reference_spp,

@@ -9,7 +9,7 @@ use clap::Args;
 use super::args::RenderArgs;
 use super::format::significant;
 use super::print;
-use crate::choice::Choice;
+use crate::choice::{Candidate, Choice};
 use crate::effects::Effects;
 use crate::error::{Error, Result};
 use crate::job::prepare;
@@ -107,8 +107,8 @@ fn print_json(value: &serde_json::Value) -> Result<()> {
 
 /// What `--integrator auto` has chosen, and by which figures.
 fn why_chosen(choice: &Choice) -> String {
-    let name = choice.integrator.name();
-    let mut text = format!("\n--integrator auto is {name} here");
+    let name = choice.candidate.name();
+    let mut text = format!("\nWhat pays here is {name}");
     if let Some(why) = choice.without_pilot {
         let _ = writeln!(text, ": {why}");
         return text;
@@ -123,7 +123,7 @@ fn why_chosen(choice: &Choice) -> String {
         let _ = write!(
             text,
             "  {:10}  {:>17}  {:>11}  {:>12}  {:>11}  {:>8}",
-            trial.integrator.name(),
+            trial.candidate.name(),
             significant(trial.relative_variance),
             significant(trial.rays),
             significant(trial.connections),
@@ -139,13 +139,15 @@ fn why_chosen(choice: &Choice) -> String {
 fn choice_json(choice: &Choice) -> serde_json::Value {
     let trials = choice.trials.iter().map(|trial| {
         serde_json::json!({
-            "integrator": trial.integrator.name(), "relative_variance": trial.relative_variance,
-            "rays": trial.rays, "connections": trial.connections, "cost": trial.cost,
+            "integrator": trial.candidate.integrator().name(),
+            "radiance_cache": trial.candidate == Candidate::RadianceCache, "relative_variance": trial.relative_variance,
+            "rays": trial.rays, "connections": trial.connections, "lookups": trial.lookups, "cost": trial.cost,
             "effort": trial.effort(), "doubt": trial.doubt,
         })
     });
     serde_json::json!({
-        "integrator": choice.integrator.name(), "without_pilot": choice.without_pilot,
+        "integrator": choice.candidate.integrator().name(),
+        "radiance_cache": choice.candidate == Candidate::RadianceCache, "without_pilot": choice.without_pilot,
         "trials": trials.collect::<Vec<_>>(),
     })
 }

@@ -15,7 +15,7 @@ use clap::{Args, Id};
 use self::options::Passed;
 use self::scripts::{JOBS, Plan, SUBMIT, quote};
 use super::args::RenderArgs;
-use super::choices::{Estimator, Wanted};
+use super::choices::{Caching, Estimator, Wanted};
 use super::format::{duration, percent};
 use super::signals::Signals;
 use super::{print, values};
@@ -159,6 +159,14 @@ pub(super) fn run(args: &SlurmArgs) -> Result<()> {
     if render.integrator == Estimator::Auto {
         // Chosen once, not by every part.
         begin.push(format!("--integrator={}", job.settings().integrator.name()));
+    }
+    if render.radiance_cache == Some(Caching::Auto) {
+        let word = if job.settings().radiance_cache {
+            "on"
+        } else {
+            "off"
+        };
+        begin.push(format!("--radiance-cache={word}"));
     }
     if let Some(limit) = render.error {
         merge.push(format!("--error={limit}"));

@@ -4,7 +4,7 @@ use clap::ValueEnum as _;
 use glam::DVec3;
 
 use crate::cli::args::RenderArgs;
-use crate::cli::choices::Wanted;
+use crate::cli::choices::{Caching, Wanted};
 use crate::error::{Error, Result};
 use crate::output::ProgressMode;
 use crate::sampler::Sampler;
@@ -139,7 +139,9 @@ impl Passed {
         give("max-bounces", max_bounces.map(|n| n.to_string()));
         give(
             "radiance-cache",
-            radiance_cache.map(|on| if on { "on" } else { "off" }.into()),
+            radiance_cache
+                .filter(|caching| *caching != Caching::Auto)
+                .map(|caching| caching.name().into()),
         );
         give(
             "roulette",
