@@ -74,12 +74,7 @@ fn figures_are_those_of_renders() {
             let settings = Settings {
                 width: 128,
                 height: 128,
-                crop: Rect {
-                    x: 0,
-                    y: 0,
-                    width: 128,
-                    height: 128,
-                },
+                crop: Rect::whole(128, 128),
                 samples: 0..64,
                 seed: 1,
                 integrator: trial.integrator,
