@@ -236,7 +236,7 @@ impl Disney {
     }
 
     fn frame(&self, surface: &Surface) -> Frame {
-        Frame::about(surface.normal, self.axis.normalize())
+        Frame::about(surface.normal, schema::along(self.axis))
     }
 
     /// Its hue, as bright as white; the luminance is Burley's.
@@ -368,7 +368,7 @@ impl Bsdf for Disney {
         vec![
             self.specular_color().into(),
             self.sheen_color().into(),
-            self.axis.normalize().into(),
+            schema::along(self.axis).into(),
             alpha.x.into(),
             alpha.y.into(),
             self.roughness.into(),
@@ -387,7 +387,7 @@ impl Bsdf for Disney {
     }
 
     fn albedo(&self) -> DVec3 {
-        MARGIN * most_scattered(self, self.axis.normalize())
+        MARGIN * most_scattered(self, schema::along(self.axis))
     }
 
     // The k-th power of the largest weight, 2 pi f cos, each term at its most: Fd is at most (1/2 + 2 r)^2 or 1,
@@ -428,7 +428,7 @@ impl Bsdf for Disney {
 
     fn warning(&self) -> Option<[String; 2]> {
         gains_energy(
-            most_scattered(self, self.axis.normalize()),
+            most_scattered(self, schema::along(self.axis)),
             "the model's lobes are not weighed against each other: use a darker `base_color`, \
              or less `subsurface`, `sheen` or `clearcoat`",
         )
