@@ -212,12 +212,7 @@ fn geometry_forms() {
         part.spheres.truncate(count);
         let small = |s: &mut Settings| {
             (s.width, s.height) = (320, 180);
-            s.crop = Rect {
-                x: 0,
-                y: 0,
-                width: 320,
-                height: 180,
-            };
+            s.crop = Rect::whole(320, 180);
         };
         let list = ours(
             &part,

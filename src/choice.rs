@@ -230,12 +230,7 @@ fn pilot(settings: &Settings, integrator: Integrator, pixels: f64) -> Settings {
     Settings {
         width,
         height,
-        crop: Rect {
-            x: 0,
-            y: 0,
-            width,
-            height,
-        },
+        crop: Rect::whole(width, height),
         samples: 0..SAMPLES,
         seed: 0,
         integrator,

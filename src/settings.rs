@@ -77,12 +77,7 @@ impl Settings {
         Self {
             width: scene.width,
             height: scene.height,
-            crop: Rect {
-                x: 0,
-                y: 0,
-                width: scene.width,
-                height: scene.height,
-            },
+            crop: Rect::whole(scene.width, scene.height),
             samples: 0..scene.render.spp.unwrap_or(DEFAULT_SPP),
             seed: 0,
             max_bounces: scene.render.max_bounces.unwrap_or(DEFAULT_MAX_BOUNCES),
@@ -117,6 +112,17 @@ pub struct Rect {
 }
 
 impl Rect {
+    /// All of an image of this size, in pixels.
+    #[must_use]
+    pub const fn whole(width: u32, height: u32) -> Self {
+        Self {
+            x: 0,
+            y: 0,
+            width,
+            height,
+        }
+    }
+
     /// The number of pixels.
     #[must_use]
     pub fn pixels(&self) -> usize {

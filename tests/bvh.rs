@@ -3,7 +3,6 @@
 //! `gpu-trace check` has the hits of all crowds, case 40.
 
 use crate::common::{gpu, gpu_renderer, render_gpu, scene, scene_file, scene_files};
-use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
 use gpu_trace::bvh::{Ball, MOST_SAH_LEVELS, NOTHING, Options, Tree, WIDTH};
 use gpu_trace::effects::Effects;
@@ -14,18 +13,8 @@ use gpu_trace::render::render_quietly;
 use gpu_trace::scene::{Material, Scene};
 use gpu_trace::settings::{GeometryChoice, Settings};
 use gpu_trace::verify::{
-    Crowd, EMPTY, Random, RayRows, Row, crowds, image_bits, settings, share_off, vector,
+    Crowd, EMPTY, HitRow, Random, RayRows, Row, crowds, image_bits, settings, share_off, vector,
 };
-
-/// What `probe_closest_hit` and `probe_lamp_hit` answer.
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
-#[repr(C)]
-struct Answer {
-    t: f32,
-    index: u32,
-    inside: u32,
-    unused: u32,
-}
 
 fn balls(crowd: &Crowd) -> Vec<Ball> {
     let ball = |&(center, radius): &(Vec3, f32)| Ball {
@@ -165,7 +154,7 @@ fn empty() -> Placement {
     Placement::new(&scene, scene.width, scene.height)
 }
 
-fn hits(placement: &Placement, form: &str, effects: &[&str], rays: &[RayRows]) -> Vec<Answer> {
+fn hits(placement: &Placement, form: &str, effects: &[&str], rays: &[RayRows]) -> Vec<HitRow> {
     let probe = probe(placement, form, effects);
     probe
         .call("closest_hit", rays)
@@ -173,7 +162,7 @@ fn hits(placement: &Placement, form: &str, effects: &[&str], rays: &[RayRows]) -
 }
 
 /// How many differ.
-fn apart(a: &[Answer], b: &[Answer]) -> usize {
+fn apart(a: &[HitRow], b: &[HitRow]) -> usize {
     assert_eq!(a.len(), b.len());
     a.iter().zip(b).filter(|(a, b)| a != b).count()
 }
@@ -320,12 +309,12 @@ fn a_lamp_is_seen_where_it_is_the_first_hit() {
             })
             .collect();
         let probe = probe(&placement, "bvh", &LIT);
-        let found: Vec<Answer> = probe
+        let found: Vec<HitRow> = probe
             .call("lamp_hit", &asked)
             .unwrap_or_else(|e| panic!("{e}"));
         for ((asked, first), found) in asked.iter().zip(&first).zip(&found) {
             let (limb, lamp) = (asked[3][0], asked[3][1].to_bits());
-            let hides = |hit: &Answer| hit.index != lamp && hit.t < limb;
+            let hides = |hit: &HitRow| hit.index != lamp && hit.t < limb;
             assert_eq!(hides(first), hides(found), "{}: {asked:?}", crowd.name);
             blocked[usize::from(hides(first))] += 1;
             if !hides(first) {

@@ -327,12 +327,7 @@ fn a_window_cut_short_is_the_last() {
             0
         }
     }
-    const RECT: Rect = Rect {
-        x: 0,
-        y: 0,
-        width: 2,
-        height: 2,
-    };
+    const RECT: Rect = Rect::whole(2, 2);
     let settings = Settings {
         time: Some(Duration::from_secs(3600)),
         ..settings(&scene(FURNACE), 2, 2, 256)

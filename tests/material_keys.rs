@@ -1,9 +1,10 @@
 //! What scene files may say of materials: defaults, limits, and errors with their place.
 
+use glam::DVec3;
 use gpu_trace::error::Error;
-use gpu_trace::materials::MaterialKind;
 use gpu_trace::materials::disney::Disney;
 use gpu_trace::materials::nylon::Nylon;
+use gpu_trace::materials::{MaterialKind, Surface};
 use gpu_trace::scene::load::load_str;
 
 /// A scene whose material's keys begin in line 10.
@@ -34,7 +35,7 @@ fn defaults_are_the_models() {
     let MaterialKind::Ashikhmin(material) = kind(ASHIKHMIN) else {
         panic!("it is none");
     };
-    assert_eq!(material.axis, glam::DVec3::Y);
+    assert_eq!(material.axis, DVec3::Y);
     assert_eq!((material.nu, material.nv), (0.0, 1.0e6));
     let MaterialKind::Sheen(material) = kind(SHEEN) else {
         panic!("it is none");
@@ -127,6 +128,37 @@ fn errors_have_their_place() {
             message.contains(&place) && message.contains(says),
             "{changed}: {message}"
         );
+    }
+}
+
+/// An axis whose square is no f64 is a direction as any other.
+#[test]
+fn an_axis_may_be_short() {
+    let (wo, wi) = (DVec3::new(0.48, 0.36, 0.8), DVec3::new(-0.36, -0.48, 0.8));
+    let surface = Surface {
+        normal: DVec3::Z,
+        eta: 1.0,
+        offset: DVec3::Z,
+    };
+    for material in [
+        ASHIKHMIN.replace("1e6", "100"),
+        format!("{DISNEY}\nanisotropic = 0.8"),
+        "type = \"conductor\"\npreset = \"copper\"\nroughness = 0.5\nanisotropy = 0.8".into(),
+    ] {
+        let of = |axis: &str| {
+            let kind = kind(&format!("{material}\naxis = {axis}"));
+            let value = kind.evaluate(&surface, wo, wi);
+            (kind.members(), value.f_cos)
+        };
+        let long = of("[1, 0, 1]");
+        assert!(long.1.is_finite(), "{material}: {long:?}");
+        for short in ["1e-150", "1e-160", "1e-200", "5e-324"] {
+            let short = of(&format!("[{short}, 0, {short}]"));
+            assert_eq!(short, long, "{material}");
+        }
+        // Companion: of another direction.
+        let other = of("[1e-200, 1e-200, 1e-200]");
+        assert!(other.0 != long.0 && other.1 != long.1, "{material}");
     }
 }
 

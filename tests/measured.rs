@@ -4,17 +4,16 @@
 use std::path::Path;
 use std::sync::{Arc, LazyLock};
 
-use glam::{DMat3, DVec2, DVec3};
+use glam::{DMat3, DVec3};
 use gpu_trace::error::Error;
 use gpu_trace::materials::conductor::Conductor;
 use gpu_trace::materials::measured::{BrdfTable, Measured, parse};
 use gpu_trace::materials::nylon::Nylon;
 use gpu_trace::materials::{Bsdf, MaterialKind, Surface};
-use gpu_trace::reference::core::sampling::cosine_direction;
 use gpu_trace::scene::load::{Loaded, load_str_in};
 use gpu_trace::scene::summary;
 use gpu_trace::settings::Integrator;
-use gpu_trace::statistics::mean_and_error;
+use gpu_trace::statistics::{mean_and_error, normal_limit};
 use gpu_trace::verify::bsdf::Subjects;
 use gpu_trace::verify::bsdf::twin::{Wrong, samples, values};
 use gpu_trace::verify::{Random, ULP};
@@ -27,6 +26,9 @@ use crate::common::gpu;
 const COUNT: usize = 90 * 90 * 180;
 /// What the format multiplies values by.
 const SCALES: [f64; 3] = [1.0 / 1500.0, 1.15 / 1500.0, 1.66 / 1500.0];
+
+/// Directions of which means are taken.
+const SAMPLES: u32 = 50_000;
 
 /// A file with these values.
 fn file(values: impl Fn(usize) -> f64 + Sync) -> Vec<u8> {
@@ -133,52 +135,78 @@ fn entries_are_where_the_format_has_them() {
     assert!(brdf(&counted, [DVec3::Z; 2]).is_finite());
 }
 
-/// Relative errors of a table against what it was made of, where both directions are well above the horizon, sorted.
+/// The value of a material at such indices by theta_h, theta_d and phi_d as its table has, or between them.
+fn asked(material: &dyn Bsdf, [h, d, phi]: [f64; 3]) -> DVec3 {
+    brdf(material, pair(h * h / 90.0, d, phi, 0.0))
+}
+
+/// What linear interpolation is off at most, by channel: half of the largest second difference over an entry in each
+/// angle. It is an eighth of that where the function is smooth; the rest is for edges, whose difference is halved where
+/// they lie between, and for differences that are others at the corners of a cell.
+fn bound(truth: &dyn Bsdf, at: [f64; 3]) -> DVec3 {
+    let along = |angle: usize| {
+        let moved = |by: f64| {
+            let mut at = at;
+            at[angle] += by;
+            asked(truth, at)
+        };
+        let bend = |by: f64| (moved(by - 1.0) - 2.0 * moved(by) + moved(by + 1.0)).abs();
+        bend(-1.0).max(bend(0.0)).max(bend(1.0))
+    };
+    // Entries are rounded to f32.
+    0.5 * (along(0) + along(1) + along(2)) + 2.0 * ULP * asked(truth, at)
+}
+
+/// Errors of a table against what it was made of, over their bounds, where both directions are well above the horizon.
 fn errors(table: &dyn Bsdf, truth: &dyn Bsdf) -> Vec<f64> {
     let mut random = Random::new("interpolation");
-    let up = |w: DVec3| w.with_z(0.25 + 0.75 * w.z.abs()).normalize();
-    let mut errors: Vec<f64> = (0..20_000)
-        .map(|n| {
-            let o = up(random.direction());
-            let i = match n % 2 {
-                0 => {
-                    let near = -o.with_z(-o.z) + random.magnitude(-3.0, 0.0) * random.direction();
-                    near.with_z(near.z.abs().max(0.2)).normalize()
-                }
-                _ => up(random.direction()),
-            };
-            let (f, wanted) = (brdf(table, [o, i]), brdf(truth, [o, i]));
-            ((f - wanted) / wanted).abs().max_element()
-        })
-        .collect();
-    errors.sort_by(f64::total_cmp);
-    errors
+    let places = (0..20_000).map(|_| {
+        let [h, d, phi, _] = random.unit4().map(f64::from);
+        [89.0 * h, 89.0 * d, 180.0 * phi]
+    });
+    let above = |[h, d, phi]: &[f64; 3]| {
+        let both = pair(h * h / 90.0, *d, *phi, 0.0);
+        both.iter().all(|w| w.z > 0.25)
+    };
+    let error = |at| {
+        let off = asked(table, at) - asked(truth, at);
+        (off.abs() / bound(truth, at)).max_element()
+    };
+    places.filter(above).map(error).collect()
 }
 
 #[test]
 fn a_table_of_nylon_is_nylon() {
-    let table = measured(&NYLON);
-    let found = errors(&table, &Nylon::default());
-    let at = |errors: &[f64], share: f64| errors[(share * (errors.len() - 1) as f64) as usize];
-    eprintln!(
-        "half within {:e}, 99 % within {:e}, all within {:e}",
-        at(&found, 0.5),
-        at(&found, 0.99),
-        at(&found, 1.0)
-    );
-    // Its lobe is curved over some ten entries, and V-cavities have an edge.
-    assert!(at(&found, 0.5) < 1.0e-3 && at(&found, 0.99) < 0.02 && at(&found, 1.0) < 0.1);
+    let (table, nylon) = (measured(&NYLON), Nylon::default());
+    let found = errors(&table, &nylon);
+    let worst = found.iter().copied().fold(0.0, f64::max);
+    eprintln!("{} places, the worst {worst:.3} of its bound", found.len());
+    assert!(found.len() > 10_000 && worst <= 1.0, "{worst}");
     // Companion: an index that is 1 % larger.
     let other = Nylon {
-        ior: 1.01 * Nylon::default().ior,
-        ..Nylon::default()
+        ior: 1.01 * nylon.ior,
+        ..nylon.clone()
     };
-    assert!(at(&errors(&table, &other), 0.5) > 1.0e-3);
-    // And so is its light, but for grazing angles, where entries next to those below the horizon are darker.
-    let [own, nylons] = [&table as &dyn Bsdf, &Nylon::default()].map(|m| weights(m, 45.0).0);
-    let off = ((own - nylons) / nylons).abs().max_element();
-    assert!(off < 0.01, "{own} for {nylons}");
-    assert!((own / 1.03 - nylons).abs().max_element() > 0.01 * nylons.max_element());
+    let others = errors(&table, &other);
+    let beyond = others.iter().filter(|error| **error > 1.0).count();
+    eprintln!("{beyond} are beyond with another index");
+    assert!(2 * beyond > others.len(), "{beyond} of {}", others.len());
+    // And so is its light, but for samples' noise, and for what comes from within two degrees, the largest distance of
+    // entries, of the horizon: entries next to those below are darker.
+    let [own, nylons] =
+        [&table as &dyn Bsdf, &nylon].map(|material| light_by(material, material, 45.0));
+    let lost = 2_f64.to_radians().sin().powi(2);
+    let off = |factor: f64| {
+        let channel = |c: usize| {
+            let [(own, error), (wanted, other)] = [own[c], nylons[c]];
+            let limit = normal_limit(3) * error.hypot(other) + lost * wanted;
+            (factor * own - wanted).abs() / limit
+        };
+        (0..3).map(channel).fold(0.0, f64::max)
+    };
+    assert!(off(1.0) < 1.0, "{own:?} for {nylons:?}");
+    // Companion.
+    assert!(off(0.99) > 1.0, "{own:?} for {nylons:?}");
 }
 
 #[test]
@@ -224,78 +252,76 @@ fn metal() -> Conductor {
     }
 }
 
-/// The mean of samples' weights at an angle, and their variance over its square, the largest of all channels.
-fn weights(material: &dyn Bsdf, degrees: f64) -> (DVec3, f64) {
+/// The direction at an angle to the normal.
+fn at_angle(degrees: f64) -> DVec3 {
+    let (sin, cos) = degrees.to_radians().sin_cos();
+    DVec3::new(sin, 0.0, cos)
+}
+
+/// The mean of samples' weights at an angle, by channel, and its standard error. `by`: whose directions are sampled.
+fn light_by(by: &dyn Bsdf, material: &dyn Bsdf, degrees: f64) -> [(f64, f64); 3] {
     let mut random = Random::new("weights");
-    let (sin, cos) = degrees.to_radians().sin_cos();
-    let wo = DVec3::new(sin, 0.0, cos);
-    let weights: Vec<DVec3> = (0..50_000)
+    let wo = at_angle(degrees);
+    let weights: Vec<DVec3> = (0..SAMPLES)
         .map(|_| {
-            let u = random.unit4().map(f64::from);
-            material.sample(&flat(), wo, u).weight
+            let sample = by.sample(&flat(), wo, random.unit4().map(f64::from));
+            let value = material.evaluate(&flat(), wo, sample.wi);
+            match sample.pdf > 0.0 {
+                true => value.f_cos / sample.pdf,
+                false => DVec3::ZERO,
+            }
         })
         .collect();
-    let of = [0, 1, 2].map(|channel| {
+    [0, 1, 2].map(|channel| {
         let all: Vec<f64> = weights.iter().map(|w| w[channel]).collect();
-        let (mean, error) = mean_and_error(&all);
-        (mean, (error / mean).powi(2) * all.len() as f64)
-    });
-    let means = of.map(|(mean, _)| mean);
-    (
-        means.into(),
-        of.into_iter().map(|(_, x)| x).fold(0.0, f64::max),
-    )
+        mean_and_error(&all)
+    })
 }
 
-fn spread(material: &dyn Bsdf, degrees: f64) -> f64 {
-    weights(material, degrees).1
-}
-
-/// The same of directions by the cosine alone.
-fn by_the_cosine(material: &dyn Bsdf, degrees: f64) -> f64 {
-    let mut random = Random::new("cosine");
-    let (sin, cos) = degrees.to_radians().sin_cos();
-    let weights: Vec<f64> = (0..50_000)
-        .map(|_| {
-            let [x, y, ..] = random.unit4().map(f64::from);
-            let wi = cosine_direction(DVec3::Z, DVec2::new(x, y));
-            brdf(material, [DVec3::new(sin, 0.0, cos), wi]).x
-        })
-        .collect();
-    let (mean, error) = mean_and_error(&weights);
-    (error / mean).powi(2) * weights.len() as f64
+/// Their variance over the square of their mean, the largest of all channels.
+fn spread_by(by: &dyn Bsdf, material: &dyn Bsdf, degrees: f64) -> f64 {
+    let of = light_by(by, material, degrees).map(|(mean, error)| (error / mean).powi(2));
+    of.into_iter().fold(0.0, f64::max) * f64::from(SAMPLES)
 }
 
 #[test]
 fn what_is_fitted_leaves_little() {
-    // Metals from narrow to wide lobes, which a lobe of their own kind fits, and nylon, which it does not.
-    for roughness in [0.15, 0.3, 0.5, 0.8] {
+    // Half of what the lobe of any other of these leaves at least, whose alpha is 1.8 times as large or more: by so much
+    // a fit may be off.
+    const LIMIT: f64 = 0.3;
+    // Metals from narrow to wide lobes, which a lobe of their own kind fits.
+    let tables = [0.15, 0.3, 0.5, 0.8].map(|roughness| {
         let rough = Conductor {
             roughness,
             ..metal()
         };
-        let table = measured(&file_of(&rough));
-        let found = [20.0, 45.0, 70.0].map(|degrees| spread(&table, degrees));
-        let alpha = table.table.as_ref().map(|table| table.lobe().alpha);
-        eprintln!("roughness {roughness}: {found:.3?}, alpha {alpha:?}");
-        assert!(
-            found[1] <= 0.3 && found.iter().all(|x| *x <= 0.6),
-            "{roughness}: {found:?}"
-        );
+        measured(&file_of(&rough))
+    });
+    for (i, table) in tables.iter().enumerate() {
+        for degrees in [20.0, 45.0, 70.0] {
+            let found = [0, 1, 2, 3].map(|by| spread_by(&tables[by], table, degrees));
+            eprintln!("metal {i} at {degrees}: {found:.3?}");
+            assert!(found[i] <= LIMIT, "metal {i} at {degrees}: {found:?}");
+            // Companion.
+            let mut others = (0..4).filter(|by| *by != i);
+            let all = others.all(|by| found[by] > 2.0 * LIMIT);
+            assert!(all, "metal {i} at {degrees}: {found:?}");
+        }
     }
-    let found = spread(&measured(&NYLON), 45.0);
-    eprintln!("nylon: {found:.3}");
-    assert!(found <= 0.3, "{found}");
-    // Where there is no lobe, the cosine alone leaves nothing; of a narrow one, nearly everything.
+    // Where there is no lobe, the cosine alone leaves nothing but rounding to f32; of a narrow one, nearly everything.
     let dull = BrdfTable::sampled([2, 2, 2], |_, _| DVec3::splat(0.1));
     assert!(dull.lobe().lobe.iter().all(|share| *share < 1.0e-4));
-    let narrow = measured(&file_of(&Conductor {
-        roughness: 0.15,
-        ..metal()
-    }));
-    assert!(spread(&Measured::of("dull", Arc::new(dull), DVec3::ONE), 45.0) < 1.0e-6);
-    // Companion.
-    assert!(by_the_cosine(&narrow, 45.0) > 10.0);
+    let dull = Measured::of("dull", Arc::new(dull), DVec3::ONE);
+    assert!(spread_by(&dull, &dull, 45.0) < 1.0e-6);
+    assert!(spread_by(&dull, &tables[0], 45.0) > 10.0);
+    // Nylon, which a lobe of another kind has to do for: twice as well as those of the metals and as none.
+    let nylon = measured(&NYLON);
+    let found = spread_by(&nylon, &nylon, 45.0);
+    let others = tables.iter().chain([&dull]);
+    let others: Vec<f64> = others.map(|by| spread_by(by, &nylon, 45.0)).collect();
+    eprintln!("nylon: {found:.3}, {others:.3?}");
+    let all = others.iter().all(|other| 2.0 * found < *other);
+    assert!(all, "{found}, {others:?}");
 }
 
 // ---- Files ----

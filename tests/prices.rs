@@ -189,12 +189,7 @@ fn measured(scene: &str, parts: usize) -> PriceList {
     let settings = Settings {
         width: 16,
         height: 16,
-        crop: Rect {
-            x: 0,
-            y: 0,
-            width: 16,
-            height: 16,
-        },
+        crop: Rect::whole(16, 16),
         ..Settings::for_scene(&scene)
     };
     let mut watch = Quiet { left: parts };

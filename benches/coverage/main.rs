@@ -61,12 +61,7 @@ fn main() {
             let settings = Settings {
                 width,
                 height,
-                crop: Rect {
-                    x: 0,
-                    y: 0,
-                    width,
-                    height,
-                },
+                crop: Rect::whole(width, height),
                 sampler,
                 ..Settings::for_scene(&loaded.scene)
             };

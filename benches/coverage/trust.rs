@@ -48,12 +48,7 @@ pub(crate) fn table(gpu: &Gpu, seeds: u64, names: &[&String]) {
         let settings = Settings {
             width,
             height,
-            crop: Rect {
-                x: 0,
-                y: 0,
-                width,
-                height,
-            },
+            crop: Rect::whole(width, height),
             integrator,
             roulette: !integrator.is_lecture(),
             ..Settings::for_scene(&loaded.scene)

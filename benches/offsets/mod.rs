@@ -139,12 +139,7 @@ fn picture() {
     for (i, offset) in MODES.iter().enumerate() {
         let settings = Settings {
             samples: 0..1024,
-            crop: Rect {
-                x: 0,
-                y: 0,
-                width,
-                height,
-            },
+            crop: Rect::whole(width, height),
             offset: *offset,
             ..Settings::for_scene(&scene)
         };

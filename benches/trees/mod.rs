@@ -32,12 +32,7 @@ pub(crate) fn run() {
     for (count, spp) in COUNTS {
         let scene = crowd(count);
         let small = |s: &mut Settings, geometry| {
-            s.crop = Rect {
-                x: 0,
-                y: 0,
-                width: scene.width,
-                height: scene.height,
-            };
+            s.crop = Rect::whole(scene.width, scene.height);
             s.samples = 0..spp;
             s.geometry = geometry;
         };

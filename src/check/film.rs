@@ -63,12 +63,7 @@ pub(super) fn sized(context: &Context, scene: &Scene, size: [u32; 2], spp: u64) 
     Settings {
         width,
         height,
-        crop: Rect {
-            x: 0,
-            y: 0,
-            width,
-            height,
-        },
+        crop: Rect::whole(width, height),
         ..context.settings(scene, 1, spp)
     }
 }

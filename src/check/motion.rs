@@ -1,6 +1,5 @@
 //! Case 41: spheres that move, with the kernel's own functions.
 
-use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 
 use super::Case;
@@ -12,7 +11,9 @@ use crate::error::Result;
 use crate::gpu::probe::Probe;
 use crate::placement::{Placement, Side};
 use crate::reference::scene::sphere::{root_outside, sphere_quadratic};
-use crate::verify::{Crowd, EMPTY, Measure, Random, RayRows, Row, ULP, crowds, to_row, vector};
+use crate::verify::{
+    Crowd, EMPTY, HitRow, Measure, Random, RayRows, Row, ULP, crowds, to_row, vector,
+};
 
 pub(super) const CASES: &[Case] = &[Case {
     id: 41,
@@ -148,16 +149,6 @@ fn one_by_one(context: &Context, measure: &mut Measure) -> Result<()> {
     Ok(())
 }
 
-/// What `probe_closest_hit` answers.
-#[derive(Clone, Copy, Debug, Pod, Zeroable)]
-#[repr(C)]
-struct Answer {
-    t: f32,
-    index: u32,
-    inside: u32,
-    unused: u32,
-}
-
 /// Ways of the spheres of a crowd: one that all have, and one of its own for each but every fourth.
 fn ways(crowd: &Crowd, random: &mut Random) -> Vec<DVec3> {
     let reach = crowd
@@ -204,15 +195,13 @@ fn in_crowds(context: &Context, measure: &mut Measure) -> Result<()> {
                 [from, offset, d, to_row(way, random.unit() - 0.5)]
             })
             .collect();
-        let [list, tree] = [["list"], ["bvh"]].map(|form| -> Result<Vec<Answer>> {
+        let [list, tree] = [["list"], ["bvh"]].map(|form| -> Result<Vec<HitRow>> {
             let effects = Effects::named(&[&GLASS[..], &form].concat());
             let probe = Probe::new(&context.gpu, &scene, &placement, &effects)?;
             probe.call("closest_hit", &rays)
         });
         for (ray, (list, tree)) in rays.iter().zip(list?.iter().zip(&tree?)) {
-            let same = (list.t.to_bits(), list.index, list.inside)
-                == (tree.t.to_bits(), tree.index, tree.inside);
-            measure.add(if same { 0.0 } else { f64::INFINITY }, || {
+            measure.add(if tree == list { 0.0 } else { f64::INFINITY }, || {
                 format!("{}: {ray:?}: {tree:?} for {list:?}", crowd.name)
             });
         }

@@ -433,12 +433,9 @@ impl RenderArgs {
         if let Some((width, height)) = self.size {
             (settings.width, settings.height) = (width, height);
         }
-        settings.crop = self.crop.unwrap_or(Rect {
-            x: 0,
-            y: 0,
-            width: settings.width,
-            height: settings.height,
-        });
+        settings.crop = self
+            .crop
+            .unwrap_or(Rect::whole(settings.width, settings.height));
         if let Some(spp) = self.spp {
             settings.samples = 0..spp;
         } else if self.error.is_some() || self.time.is_some() {

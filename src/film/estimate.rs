@@ -94,12 +94,7 @@ mod tests {
     /// much that nothing is left of twice what both say.
     #[test]
     fn an_error_is_known_whatever_the_noise() {
-        let rect = Rect {
-            x: 0,
-            y: 0,
-            width: 1,
-            height: 1,
-        };
+        let rect = Rect::whole(1, 1);
         let mut film = Film::new(rect);
         // Sum, and squared deviations of the batches' sums from their mean.
         for (samples, sum, m2) in [(0..16, 0.4, 0.12), (16..64, 48.0, 0.0)] {

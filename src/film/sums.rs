@@ -345,12 +345,7 @@ mod tests {
     /// that they have, over what it is: plainly, and by the jackknife.
     fn said_of_rare_light() -> [f64; 2] {
         const SIDE: u32 = 256;
-        let rect = Rect {
-            x: 0,
-            y: 0,
-            width: SIDE,
-            height: SIDE,
-        };
+        let rect = Rect::whole(SIDE, SIDE);
         let mut random = Random::new("rare light");
         let mut film = Film::new(rect);
         for samples in [0..16, 16..64] {

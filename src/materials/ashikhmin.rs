@@ -84,7 +84,7 @@ fn away_from_grazing(cosine: f64) -> f64 {
 
 impl Ashikhmin {
     fn frame(&self, surface: &Surface) -> Frame {
-        Frame::about(surface.normal, self.axis.normalize())
+        Frame::about(surface.normal, schema::along(self.axis))
     }
 
     fn exponents(&self) -> DVec2 {
@@ -178,7 +178,7 @@ impl Bsdf for Ashikhmin {
             self.specular.into(),
             self.nu.into(),
             self.nv.into(),
-            self.axis.normalize().into(),
+            schema::along(self.axis).into(),
         ]
     }
 

@@ -161,7 +161,7 @@ impl Conductor {
     }
 
     fn frame(&self, surface: &Surface) -> Frame {
-        Frame::about(surface.normal, self.axis.normalize())
+        Frame::about(surface.normal, schema::along(self.axis))
     }
 }
 
@@ -209,7 +209,7 @@ impl Bsdf for Conductor {
             k.into(),
             alpha.x.into(),
             alpha.y.into(),
-            self.axis.normalize().into(),
+            schema::along(self.axis).into(),
         ]
     }
 

@@ -9,7 +9,7 @@ use serde::Deserialize;
 use super::ggx::{Frame, alpha, ggx_d, ggx_normal, ggx_pdf, ggx_s};
 use super::lobes::{Lobes, Pair, arrival, schlick};
 use super::powers::expm1_over;
-use super::scattered::{MARGIN, most_scattered};
+use super::scattered::{MARGIN, gains_energy, most_scattered};
 use super::{
     Bsdf, BsdfSample, BsdfValue, Form, Member, MemberValue, Mistake, Surface, Value, luminance,
     schema,
@@ -58,9 +58,6 @@ pub(super) const FORMS: &[Form] = &[Form {
 
 /// Roughness of the clearcoat in its shadowing.
 const COAT_SHADOWING: DVec2 = DVec2::splat(0.25);
-
-/// A material that scatters this much more than everything is said to gain energy: what the figure is known to.
-const ENERGY_SLACK: f64 = 0.01;
 
 /// Disney's principled model of 2012. Nothing bounds the sum of its lobes: at grazing angles bright colours
 /// scatter more light than they receive.
@@ -239,7 +236,7 @@ impl Disney {
     }
 
     fn frame(&self, surface: &Surface) -> Frame {
-        Frame::about(surface.normal, self.axis.normalize())
+        Frame::about(surface.normal, schema::along(self.axis))
     }
 
     /// Its hue, as bright as white; the luminance is Burley's.
@@ -371,7 +368,7 @@ impl Bsdf for Disney {
         vec![
             self.specular_color().into(),
             self.sheen_color().into(),
-            self.axis.normalize().into(),
+            schema::along(self.axis).into(),
             alpha.x.into(),
             alpha.y.into(),
             self.roughness.into(),
@@ -390,7 +387,7 @@ impl Bsdf for Disney {
     }
 
     fn albedo(&self) -> DVec3 {
-        MARGIN * most_scattered(self, self.axis.normalize())
+        MARGIN * most_scattered(self, schema::along(self.axis))
     }
 
     // The k-th power of the largest weight, 2 pi f cos, each term at its most: Fd is at most (1/2 + 2 r)^2 or 1,
@@ -430,14 +427,10 @@ impl Bsdf for Disney {
     }
 
     fn warning(&self) -> Option<[String; 2]> {
-        let most = most_scattered(self, self.axis.normalize()).max_element();
-        (most > 1.0 + ENERGY_SLACK).then(|| {
-            [
-                format!("gains energy: at some angles it scatters {most:.2} times the light"),
-                "the model's lobes are not weighed against each other: use a darker `base_color`, \
-                 or less `subsurface`, `sheen` or `clearcoat`"
-                    .into(),
-            ]
-        })
+        gains_energy(
+            most_scattered(self, schema::along(self.axis)),
+            "the model's lobes are not weighed against each other: use a darker `base_color`, \
+             or less `subsurface`, `sheen` or `clearcoat`",
+        )
     }
 }

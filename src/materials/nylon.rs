@@ -9,7 +9,7 @@ use serde::Deserialize;
 use super::ggx::Frame;
 use super::lobes::{Lobes, Pair, arrival};
 use super::powers::{expm1_over, log1p_over};
-use super::scattered::{MARGIN, most_scattered};
+use super::scattered::{MARGIN, gains_energy, most_scattered};
 use super::{
     Bsdf, BsdfSample, BsdfValue, Form, Member, MemberValue, Surface, Value, luminance, schema,
 };
@@ -39,9 +39,6 @@ const MAX_A: f64 = 1.0e6;
 const MAX_B: f64 = 1.0e6;
 const MAX_C: f64 = 20.0;
 const MAX_INDEX: f64 = 100.0;
-
-/// A material that scatters this much more than everything is said to gain energy: what the figure is known to.
-const ENERGY_SLACK: f64 = 0.01;
 
 /// Nylon, by a fit to measurements of it: the ABC model of microfacets, whose distribution is no density that
 /// conserves energy, over a diffuse term.
@@ -284,12 +281,9 @@ impl Bsdf for Nylon {
     }
 
     fn warning(&self) -> Option<[String; 2]> {
-        let most = most_scattered(self, DVec3::Y).max_element();
-        (most > 1.0 + ENERGY_SLACK).then(|| {
-            [
-                format!("gains energy: at some angles it scatters {most:.2} times the light"),
-                "nothing bounds the distribution's size: lower `a` or `diffuse`".into(),
-            ]
-        })
+        gains_energy(
+            most_scattered(self, DVec3::Y),
+            "nothing bounds the distribution's size: lower `a` or `diffuse`",
+        )
     }
 }

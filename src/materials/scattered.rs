@@ -10,6 +10,9 @@ use crate::reference::core::sampling::basis_around;
 /// By how much [`most_scattered`] may be too low: the tests compare it with quadrature.
 pub(super) const MARGIN: f64 = 1.02;
 
+/// A material that scatters this much more than everything is said to gain energy: what the figure is known to.
+pub(super) const ENERGY_SLACK: f64 = 0.01;
+
 /// Directions of a mean.
 const POINTS: u32 = 512;
 
@@ -34,6 +37,17 @@ pub(super) fn most_scattered(material: &dyn Bsdf, axis: DVec3) -> DVec3 {
         }
     }
     most
+}
+
+/// The warning of a material that scatters as much, if that is more than everything.
+pub(super) fn gains_energy(most: DVec3, help: &str) -> Option<[String; 2]> {
+    let most = most.max_element();
+    (most > 1.0 + ENERGY_SLACK).then(|| {
+        [
+            format!("gains energy: at some angles it scatters {most:.2} times the light"),
+            help.into(),
+        ]
+    })
 }
 
 fn mean_weight(material: &dyn Bsdf, surface: &Surface, wo: DVec3) -> DVec3 {

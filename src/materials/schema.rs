@@ -107,6 +107,12 @@ pub fn up() -> DVec3 {
     DVec3::Y
 }
 
+/// The unit vector along an axis, not 0, that may be so short that its square is no f64.
+#[must_use]
+pub fn along(axis: DVec3) -> DVec3 {
+    (axis / axis.abs().max_element()).normalize()
+}
+
 /// What is wrong with an axis.
 #[must_use]
 pub fn axis_mistake(axis: DVec3) -> Option<Mistake> {

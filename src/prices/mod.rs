@@ -119,12 +119,7 @@ pub fn smaller(settings: &Settings) -> Settings {
     Settings {
         width,
         height,
-        crop: Rect {
-            x: 0,
-            y: 0,
-            width,
-            height,
-        },
+        crop: Rect::whole(width, height),
         ..settings.clone()
     }
 }

@@ -8,6 +8,7 @@ use glam::{DMat3, DVec3};
 
 use crate::image::Picture;
 use crate::materials::Texturable;
+use crate::materials::schema::along;
 
 /// A texture, for the value of a key. Numbers are grey.
 #[derive(Clone, Debug, PartialEq)]
@@ -78,8 +79,7 @@ impl TextureImage {
         Self {
             name: name.to_owned(),
             number,
-            // Whose square may be no f64.
-            axis: (axis / axis.abs().max_element()).normalize(),
+            axis: along(axis),
             least: values().fold(DVec3::INFINITY, DVec3::min),
             largest: values().fold(DVec3::NEG_INFINITY, DVec3::max),
             mean: sums.sum::<DVec3>() / width as f64,

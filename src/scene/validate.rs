@@ -18,6 +18,7 @@ use super::{
     Camera, Handedness, Material, RenderDefaults, Scene, Sphere, environment, measured, mix,
 };
 use crate::materials::Mistake;
+use crate::materials::schema::along;
 
 /// Directions whose angle has a smaller sine are parallel: of the sixteen digits of an f64 the
 /// cross product keeps half, which is what the f32 of the GPU needs.
@@ -337,8 +338,7 @@ fn camera(table: &CameraTable, report: &mut Report) -> Option<Camera> {
 
 /// The vector's direction; `None` if it has none. Lengths whose square is no f64 are fine.
 fn direction(vector: DVec3) -> Option<DVec3> {
-    let largest = vector.abs().max_element();
-    (largest > 0.0).then(|| (vector / largest).normalize())
+    (vector.abs().max_element() > 0.0).then(|| along(vector))
 }
 
 /// The vector, made longer by a power of two if computing with it would lose it.

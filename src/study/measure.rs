@@ -177,12 +177,7 @@ mod tests {
     }
 
     fn film(values: &[[f64; 3]]) -> Film {
-        let rect = Rect {
-            x: 0,
-            y: 0,
-            width: SIDE,
-            height: SIDE,
-        };
+        let rect = Rect::whole(SIDE, SIDE);
         let pixel = |v: &[f64; 3]| PixelSums {
             sum: *v,
             m2: [0.0; 3],

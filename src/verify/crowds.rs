@@ -1,5 +1,6 @@
 //! Crowds of spheres that are hard on a tree, and rays at them.
 
+use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
 
 use super::{Random, Row};
@@ -7,6 +8,28 @@ use crate::placement::{PlacedSphere, Placement, Side};
 
 /// Rows of a ray for `probe_closest_hit` of `shaders/probe.wesl`.
 pub type RayRows = [Row; 3];
+
+/// What `probe_closest_hit` and `probe_lamp_hit` of `shaders/probe.wesl` answer.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct HitRow {
+    /// In units of the direction's length.
+    pub t: f32,
+    /// Index into the placement's spheres.
+    pub index: u32,
+    /// 1 if the ray arrived from inside the sphere.
+    pub inside: u32,
+    /// Nothing.
+    pub unused: u32,
+}
+
+// To the bit.
+impl PartialEq for HitRow {
+    fn eq(&self, other: &Self) -> bool {
+        (self.t.to_bits(), self.index, self.inside)
+            == (other.t.to_bits(), other.index, other.inside)
+    }
+}
 
 /// Spheres, as centre and radius.
 #[derive(Clone, Debug)]

@@ -12,7 +12,7 @@ mod rows;
 mod scenes;
 
 pub use cells::{Cells, Outcome};
-pub use crowds::{Crowd, RayRows, crowds};
+pub use crowds::{Crowd, HitRow, RayRows, crowds};
 pub use images::{image_bits, leave_images, means, picture_of, share_off};
 pub use measure::{Agreement, Measure};
 pub use random::Random;

@@ -16,12 +16,7 @@ pub fn settings(scene: &Scene, width: u32, height: u32, spp: u64) -> Settings {
     Settings {
         width,
         height,
-        crop: Rect {
-            x: 0,
-            y: 0,
-            width,
-            height,
-        },
+        crop: Rect::whole(width, height),
         samples: 0..spp,
         ..Settings::for_scene(scene)
     }

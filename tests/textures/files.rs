@@ -145,6 +145,8 @@ fn images_are_textures() {
     }
     let exr = of("albedo = { image = \"a.exr\" }\naxis = [0, 0, 2]");
     assert_eq!((exr.axis(), exr.name()), (DVec3::Z, "a.exr"));
+    let short = of("albedo = { image = \"a.exr\" }\naxis = [0, 0, 1e-200]");
+    assert_eq!(short.axis(), DVec3::Z);
     assert_eq!(of("albedo = { image = \"./a.exr\" }").axis(), DVec3::Y);
     // All that counts is in the hash.
     let hash = |line: &str| load(&folder, line).expect("good").hash;

@@ -18,7 +18,7 @@ alone.
   --all       the long forms of the tests, and all of them on every driver
   --drivers   install the drivers that are missing; it is an error if one cannot be
 
-Further arguments choose tests, the same on every driver, and options of their harness: `-- faults::memory
+Further arguments choose tests, the same on every driver, and options of their harness: `-- faults::disks
 --nocapture`, say, or `--lib`.
 ";
 

@@ -175,12 +175,7 @@ fn base(args: &ConvergeArgs, loaded: &Loaded, preset: Option<&Preset>) -> Settin
     let scale = (f64::from(side) / f64::from(width.max(height))).min(1.0);
     let small = |n: u32| ((f64::from(n) * scale).round() as u32).max(1);
     (settings.width, settings.height) = args.size.unwrap_or((small(width), small(height)));
-    settings.crop = Rect {
-        x: 0,
-        y: 0,
-        width: settings.width,
-        height: settings.height,
-    };
+    settings.crop = Rect::whole(settings.width, settings.height);
     settings
 }
 

@@ -8,7 +8,7 @@ use super::coat::{Clearcoat, Coat, lost_below};
 use super::flakes::Flakes;
 use super::ggx::Frame;
 use super::paint::{Lobe, Paint};
-use super::scattered::most_scattered;
+use super::scattered::{ENERGY_SLACK, most_scattered};
 use super::uniform::cosine_moment;
 use super::{Bsdf, BsdfSample, BsdfValue, Form, MemberValue, Mistake, Surface, Value, schema};
 
@@ -189,9 +189,6 @@ impl CarPaint {
         Some(Coat::over(paint, surface.eta * ior, wo))
     }
 }
-
-/// A paint that reflects this much more than everything is said to gain energy: what the figure is known to.
-const ENERGY_SLACK: f64 = 0.01;
 
 impl Bsdf for CarPaint {
     fn form(&self) -> &'static Form {

@@ -10,7 +10,7 @@ use serde::{Deserialize, Deserializer};
 
 use super::ggx::{Frame, ggx_normal, ggx_pdf};
 use super::lobes::{Lobes, Pair, arrival};
-use super::scattered::MARGIN;
+use super::scattered::{MARGIN, gains_energy};
 use super::{Bsdf, BsdfSample, BsdfValue, Form, Member, MemberValue, Surface, Value};
 use crate::reference::core::sampling::cosine_direction;
 
@@ -54,9 +54,6 @@ pub fn is_tabled(form: &Form) -> bool {
 
 /// The largest factor: with the largest entry the product is an f32.
 const MAX_SCALE: f64 = 1.0e10;
-
-/// A material that scatters this much more than everything is said to gain energy: what the figure is known to.
-const ENERGY_SLACK: f64 = 0.01;
 
 /// A measured isotropic material: a file of the MERL database.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
@@ -222,12 +219,6 @@ impl Bsdf for Measured {
     }
 
     fn warning(&self) -> Option<[String; 2]> {
-        let most = self.most().max_element();
-        (most > 1.0 + ENERGY_SLACK).then(|| {
-            [
-                format!("gains energy: at some angles it scatters {most:.2} times the light"),
-                "so its data have it: lower `scale`".into(),
-            ]
-        })
+        gains_energy(self.most(), "so its data have it: lower `scale`")
     }
 }
