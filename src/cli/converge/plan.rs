@@ -269,11 +269,12 @@ fn series(
         &bounces,
         &caches,
     ) {
-        let left_out =
+        let nudged_cpu =
             exact_on_cpu && series.backend == BackendKind::Cpu && series.offset != Offset::Exact;
         // The cache is that of `path`, and of scrambles.
         let is_other = series.integrator != Integrator::Path || series.sampler != Sampler::Sobol;
-        if !left_out && !(series.radiance_cache && is_other) && !all.contains(&series) {
+        let left_out = nudged_cpu || (series.radiance_cache && is_other);
+        if !left_out && !all.contains(&series) {
             all.push(series);
         }
     }
