@@ -247,7 +247,7 @@ fn pilot(settings: &Settings, integrator: Integrator, pixels: f64) -> Settings {
 }
 
 /// The job of a pilot with the cells that the image as `settings` have it would use, and values for them: the same for all
-/// batches, since what they add to the variance is little, and they are most of what a pilot takes. `None` where there
+/// batches, since they are most of what a pilot takes. What they add to the variance, some twentieth, is left out. `None` where there
 /// is no radiance cache.
 fn with_cells(scene: &Scene, settings: &Settings, job: Job) -> Option<(Job, Vec<DVec3>)> {
     let settings = Candidate::RadianceCache.settings(settings);

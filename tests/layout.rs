@@ -294,6 +294,8 @@ fn structs_of_the_radiance_cache_agree() {
         end,
         first_value,
         samples,
+        first_sample,
+        end_sample,
         unused,
     });
     check("PilotWork", &work, &kernel);

@@ -10,8 +10,8 @@ use crate::settings::{DEFAULT_MAX_BOUNCES, GeometryChoice, Integrator, Offset, S
 
 /// Most spheres of a scene with a cache: beyond, cells would be more than what they save.
 const MOST_SPHERES: usize = 64;
-/// Most bounces: a pilot's sample then fits what drivers let an invocation do.
-const MOST_BOUNCES: u32 = 1024;
+/// Most bounces: a pilot's sample then fits what drivers let an invocation do, whatever spheres there are.
+const MOST_BOUNCES: u32 = 128;
 
 /// Whether all that a sphere does is to reflect by Lambert's law, with a light of its own or not.
 pub(crate) fn is_diffuse(scene: &Scene, sphere: &PlacedSphere) -> bool {
@@ -46,7 +46,7 @@ pub fn obstacle(scene: &Scene, placement: &Placement, settings: &Settings) -> Op
         ),
         (
             settings.max_bounces > MOST_BOUNCES,
-            "--max-bounces is above 1024",
+            "--max-bounces is above 128",
         ),
         (settings.adaptive, "--adaptive"),
         (settings.classes, "layers by the kind of path"),

@@ -37,10 +37,12 @@ const PATHS: u32 = 1 << 17;
 pub(super) struct Cache {
     pilot: Pass,
     cells: Arc<Cells>,
+    /// Samples of a cell that an invocation takes in one dispatch.
+    most_samples: u32,
 }
 
 impl Cache {
-    /// Compiles the pilot.
+    /// Compiles the pilot, an invocation of which may take so many samples in one dispatch.
     ///
     /// # Errors
     /// [`Error::DeviceLimit`] if the device does not take the values, and if it fails.
@@ -49,6 +51,7 @@ impl Cache {
         program: &Program,
         constants: &[(&str, f64)],
         cells: &Arc<Cells>,
+        most_samples: u32,
     ) -> Result<Self> {
         let (rows, most) = (rows(cells), gpu.limits.max_texture_dimension_2d);
         if rows.max(CELLS_WIDTH) > most {
@@ -60,6 +63,7 @@ impl Cache {
         Ok(Self {
             pilot: program.pass(gpu, "pilot", constants)?,
             cells: cells.clone(),
+            most_samples,
         })
     }
 
@@ -110,7 +114,11 @@ impl Cache {
         let mut touched = 0;
         for number in window.start / batch..window.end.div_ceil(batch) {
             let first = number * batch;
-            for begin in (0..cells).step_by(step as usize) {
+            let parts = (0..samples).step_by(self.most_samples as usize);
+            for (first_sample, begin) in parts.flat_map(|at| {
+                let cells = (0..cells).step_by(step as usize);
+                cells.map(move |begin| (at, begin))
+            }) {
                 let end = (begin + step).min(cells);
                 let work = PilotRecord {
                     stream: pilot_words(seed, (first >> 32) as u32),
@@ -119,7 +127,9 @@ impl Cache {
                     end,
                     first_value: touched * self.cells.count(),
                     samples,
-                    unused: 0,
+                    first_sample,
+                    end_sample: (first_sample + self.most_samples).min(samples),
+                    ..PilotRecord::zeroed()
                 };
                 let mut recording = Recording::default();
                 recording
@@ -137,7 +147,7 @@ impl Cache {
         Ok(texels
             .iter()
             .take(values as usize)
-            .map(|texel| u64::from(texel[3]))
+            .map(|texel| u64::from(texel[3].saturating_sub(1)))
             .sum())
     }
 

@@ -311,6 +311,8 @@ pub struct PilotRecord {
     pub end: u32,
     pub first_value: u32,
     pub samples: u32,
+    pub first_sample: u32,
+    pub end_sample: u32,
     pub unused: u32,
 }
 

@@ -22,7 +22,7 @@ use crate::job::Job;
 use crate::render::{Control, Renderer};
 use crate::sampler::Sampler;
 use crate::settings::{Integrator, Rect, stream_words};
-use crate::shader::steps::step_limit;
+use crate::shader::steps::{paths_at_most, step_limit};
 use crate::shader::{Kernel, Stage, link};
 
 pub use crate::gpu::pace::DispatchLimits;
@@ -108,7 +108,8 @@ impl GpuRenderer {
         constants.extend_from_slice(more);
         let render = program.pass(&gpu, "render", &constants)?;
         let cells = job.placement().cells();
-        let cache = cells.map(|cells| Cache::new(&gpu, &program, &constants, cells));
+        let most_samples = paths_at_most(placement, effects, settings.max_bounces);
+        let cache = cells.map(|cells| Cache::new(&gpu, &program, &constants, cells, most_samples));
         let cache = cache.transpose()?;
 
         let gl = gpu.summary.backend == "gl";

@@ -113,6 +113,13 @@ impl PathTracer<'_> {
         path.found.lookups += 1;
         let (chart, sphere) = (&charts[hit.index], &spheres[hit.index]);
         let vertex = vertex_at(&path.ray, &hit, sphere);
+        // A grid is of the half about the pole.
+        if sphere
+            .pole
+            .is_some_and(|pole| vertex.normal.dot(pole) <= 0.0)
+        {
+            return false;
+        }
         let place = chart.place(vertex.offset);
         let [column, row] = chart.cell(place);
         let cell = Cell {

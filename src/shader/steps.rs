@@ -43,7 +43,7 @@ pub const LOOPS: [Loop; 18] = [
         used: |_| true,
         at_vertex: |_, _| 1,
     },
-    // Over those of the radiance cache's pilots: as many as `render` counts, once a loop turn.
+    // Over those of the radiance cache's pilots, which are in no render: `paths_at_most`.
     Loop {
         function: "pilot",
         used: |effects| effects.has(Effect::RadianceCache),
@@ -197,10 +197,11 @@ fn parts_visited(placement: &Placement, effects: &Effects) -> usize {
     }
 }
 
-/// Rays that are traced at a vertex: with light sampling also one to a light, and with the radiance cache one to another
-/// point of a cell.
+/// Rays that are traced at a vertex: with light sampling also one to a light, and with the radiance cache the next one, and
+/// one to another point of a cell.
 fn rays(effects: &Effects) -> usize {
-    1 + usize::from(effects.samples_light()) + usize::from(effects.has(Effect::RadianceCache))
+    let cache = usize::from(effects.has(Effect::RadianceCache));
+    1 + usize::from(effects.samples_light()) + 2 * cache
 }
 
 /// Most loop iterations that the kernel makes for one vertex of a path, but for those of loops that count themselves.
@@ -231,6 +232,15 @@ pub fn step_limit(placement: &Placement, effects: &Effects, max_bounces: u32, gl
     };
     let path = paths * (u64::from(max_bounces) + 1) * vertex;
     LOOP_ITERATIONS.saturating_sub(path).max(1) as u32
+}
+
+/// The paths of the radiance cache's pilot that an invocation takes in one dispatch, at least 1: as many as fit however
+/// long they are, for its loop does not look.
+#[must_use]
+pub fn paths_at_most(placement: &Placement, effects: &Effects, max_bounces: u32) -> u32 {
+    let vertex = u64::from(vertex_steps(placement, effects));
+    let path = (u64::from(max_bounces) + 1) * vertex;
+    (LOOP_ITERATIONS / path).max(1) as u32
 }
 
 /// Loops of a block, those within others among them.
