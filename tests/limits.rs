@@ -362,8 +362,13 @@ fn kernels(scene: &Scene) -> Vec<(Kernel, Placement, Effects)> {
         light_sampling: LightSampling::Cone,
         ..many.clone()
     };
+    // Where there can be one.
+    let cache = Settings {
+        radiance_cache: true,
+        ..Settings::for_scene(scene)
+    };
     let mut all = Vec::new();
-    for settings in [few, many, table] {
+    for settings in [few, many, table, cache] {
         for geometry in [
             GeometryChoice::Auto,
             GeometryChoice::List,
@@ -379,7 +384,7 @@ fn kernels(scene: &Scene) -> Vec<(Kernel, Placement, Effects)> {
     all
 }
 
-/// Five of eight stay free for what comes: trees, pilots, caches.
+/// Four of eight stay free for what comes, five without a radiance cache.
 #[test]
 fn few_storage_buffers_are_bound() {
     let mut most = 0;
@@ -392,7 +397,7 @@ fn few_storage_buffers_are_bound() {
             let binds_scene = bindings.iter().any(|b| b.name == "scene");
             assert_eq!(
                 buffers,
-                if binds_scene { 3 } else { 2 },
+                2 + usize::from(binds_scene) + usize::from(effects.has(Effect::RadianceCache)),
                 "{file:?} with {names:?}"
             );
             let reads_scene = effects.keeps_spheres()
