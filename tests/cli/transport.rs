@@ -188,3 +188,46 @@ fn devices_geometries_and_threads_agree() {
     };
     assert_eq!(threads(1), threads(3));
 }
+
+/// The radiance cache: on where there can be one, with a word where not; by choice; and parts of one image only.
+#[test]
+fn a_radiance_cache_is_used_or_said_to_be_off() {
+    let folder = Folder::new();
+    folder.ok("--size 48x48 --spp 64 --radiance-cache on -o on.exr --aov stderr --stats on.json --checkpoint on.film");
+    let stats = folder.json("on.json");
+    assert_eq!(stats["radiance_cache"], json!(true));
+    assert_eq!(stats["integrator"], json!("path"));
+    assert!(stats["mean_stderr"][0].as_f64() > Some(0.0), "{stats}");
+    let has = |file: &str| {
+        let bytes = folder.read(file);
+        bytes.windows(11).any(|word| word == b"mean_stderr")
+    };
+    // Where pixels are independent of each other nobody has to be told.
+    folder.ok("--size 48x48 --spp 64 --seed 1 -o off.exr --aov stderr --stats off.json --checkpoint off.film");
+    assert_eq!(folder.json("off.json")["radiance_cache"], json!(false));
+    assert!(has("on.exr") && !has("off.exr"));
+    folder.ok("compare on.exr off.exr");
+
+    let merged = folder.run("merge on.film off.film -o merged.exr");
+    assert_eq!(merged.code, Some(2), "{merged:?}");
+    for options in [
+        "--integrator bsdf",
+        "--sampler independent",
+        "--adaptive",
+        "--max-bounces 8",
+    ] {
+        let run = folder.run(&format!(
+            "--size 16x16 --spp 128 --radiance-cache on {options} -o r.png --stats r.json"
+        ));
+        assert_eq!(run.code, Some(0), "{run:?}");
+        let word = options.split(' ').next().unwrap_or_default();
+        holds(
+            &run.stderr,
+            &["--radiance-cache on is without effect", word],
+        );
+        assert_eq!(folder.json("r.json")["radiance_cache"], json!(false));
+    }
+    // By choice: a room gains.
+    let said = folder.ok("effects --size 320x320 --radiance-cache auto");
+    holds(&said, &["What pays here is path, cache", "radiance_cache"]);
+}
