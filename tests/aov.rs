@@ -1,8 +1,9 @@
 //! Layers beside the image: light by the kind of its path, and what is seen first.
 
 use crate::cli_support::{Folder, holds};
-use crate::common::{render_cpu, render_gpu, scene, scene_file};
+use crate::common::{gpu_renderer, render_cpu, render_gpu, scene, scene_file};
 use gpu_trace::film::{Film, LightClass};
+use gpu_trace::render::render_quietly;
 use gpu_trace::scene::Scene;
 use gpu_trace::settings::{Integrator, Settings};
 use gpu_trace::verify::settings;
@@ -27,15 +28,17 @@ fn with_aovs(scene: &Scene, integrator: Integrator, spp: u64) -> Settings {
 /// The mean light of each class over the image, and its standard error as the spread over pixels of two
 /// halves of the samples would have it; here from renders with several seeds.
 fn class_means(scene: &Scene, integrator: Integrator, seeds: u64) -> Vec<(f64, f64)> {
-    let films: Vec<Film> = (0..seeds)
-        .map(|seed| {
-            let settings = Settings {
-                seed,
-                ..with_aovs(scene, integrator, 256)
-            };
-            render_gpu(scene, &settings)
-        })
-        .collect();
+    let mut renderer = gpu_renderer(scene, &with_aovs(scene, integrator, 256));
+    let mut films = Vec::new();
+    for seed in 0..seeds {
+        let settings = Settings {
+            seed,
+            ..with_aovs(scene, integrator, 256)
+        };
+        renderer = renderer.with_seed(seed);
+        let outcome = render_quietly(&mut renderer, &settings);
+        films.push(outcome.unwrap_or_else(|e| panic!("{e}")).film);
+    }
     (0..5)
         .map(|class| {
             let mean = |film: &Film| {

@@ -63,7 +63,7 @@ fn a_second_signal_ends_it_at_once() {
         let mut run = Background::start(&folder, arguments);
         run.wait_for("effects:");
         // A signal before the first path would end it rightly.
-        sleep(Duration::from_millis(500));
+        run.wait_for_work(Duration::from_millis(500));
         run.signal(signal);
         sleep(Duration::from_millis(300));
         assert!(run.runs(), "the first one waits for the paths under way");

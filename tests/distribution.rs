@@ -138,11 +138,15 @@ fn found() -> &'static [Found] {
         let mut found = Vec::new();
         for (integrator, most) in [(Integrator::Bsdf, CASES), (LECTURE, UNIFORM_CASES)] {
             let most = if thorough() { usize::MAX } else { most };
-            let subjects = Subjects::all(&gpu(), integrator).unwrap_or_else(|e| panic!("{e}"));
-            for subject in subjects.first_of_each_form(most) {
+            let each = Subjects::each(&gpu(), integrator).unwrap_or_else(|e| panic!("{e}"));
+            let chosen = each.iter().flat_map(|subjects| {
+                let first = subjects.first_of_each_form(most);
+                first.map(move |subject| (subjects, subject))
+            });
+            for (subjects, subject) in chosen {
                 // Delta lobes are the same whatever the integrator.
                 if integrator == Integrator::Bsdf || subjects.is_uniform(subject) {
-                    let draws = Draw::all(&subjects, subject, drawn());
+                    let draws = Draw::all(subjects, subject, drawn());
                     for draw in draws.unwrap_or_else(|e| panic!("{e}")) {
                         let kind = subjects.kinds()[subject].clone();
                         found.push(Found::of(&draw, kind, integrator));

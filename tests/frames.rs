@@ -136,12 +136,12 @@ fn progress_is_that_of_the_whole() {
 #[test]
 fn a_signal_leaves_what_is_complete_and_says_how_to_go_on() {
     let folder = folder();
-    let run = Background::start(
+    let mut run = Background::start(
         &folder,
-        "move.xyz --frames 0.. --size 24x18 --time 1h -o a{frame}.npy --progress plain",
+        "move.xyz --frames 0.. --size 24x18 --time 1h -o a{frame}.npy --progress json",
     );
     // Its first frame would take an hour; the file of it is what there is.
-    std::thread::sleep(std::time::Duration::from_secs(2));
+    run.wait_for("\"progress\"");
     run.signal("INT");
     let run = run.finish();
     assert_eq!(run.code, Some(130), "{run:?}");

@@ -5,9 +5,12 @@
 use std::cell::RefCell;
 use std::collections::BTreeSet;
 use std::ops::Range;
+use std::path::PathBuf;
+use std::sync::LazyLock;
 use std::time::Duration;
 
 use crate::common::{gpu_renderer, job, render_cpu, render_gpu, scene, scene_file, scene_files};
+use crate::thorough::thorough;
 use gpu_trace::effects::{Effect, Effects};
 use gpu_trace::error::{Error, Result};
 use gpu_trace::film::{Film, PixelSums, Tally, Tiles, Window};
@@ -19,7 +22,7 @@ use gpu_trace::sampler::Sampler;
 use gpu_trace::scene::Scene;
 use gpu_trace::settings::{GeometryChoice, Integrator, LightSampling, Rect, Settings};
 use gpu_trace::shader::steps::{LOOPS, vertex_steps};
-use gpu_trace::shader::{Kernel, Stage, link};
+use gpu_trace::shader::{Binding, Kernel, Stage, link};
 use gpu_trace::verify::{Random, image_bits, means, settings};
 
 /// A closed furnace that keeps all light.
@@ -164,8 +167,10 @@ fn a_path_within_which_a_loop_ends_is_an_error_or_right() {
 fn paths_in_a_tree_go_on_in_the_next_dispatch() {
     // In the furnace every path is as long as the next, has exactly its light, and often runs into the driver's limit;
     // in the cloud paths differ, and rarely do.
+    // In the furnace a few samples are enough for that, some four in a dispatch; the long form has as many as the cloud.
     let (furnace, cloud) = (crowded_furnace(), scene(&cloud(5000)));
-    for (scene, spp, whole) in [(furnace, 64, true), (cloud, 64, false)] {
+    let few = if thorough() { 64 } else { 16 };
+    for (scene, spp, whole) in [(furnace, few, true), (cloud, 64, false)] {
         let settings = Settings {
             max_bounces: 150,
             integrator: Integrator::Bsdf,
@@ -184,7 +189,7 @@ fn paths_in_a_tree_go_on_in_the_next_dispatch() {
         let usual = film(None, 0);
         if whole {
             assert_eq!(means(&usual), vec![151.0; 3 * 256]);
-            assert_eq!(usual.tally().rays, 151 * 256 * 64);
+            assert_eq!(usual.tally().rays, 151 * 256 * spp);
         }
         for steps in [1, u32::MAX] {
             let other = film(Some(steps), 0);
@@ -345,18 +350,34 @@ fn kernel(scene: &Scene, settings: &Settings) -> (Kernel, Placement, Effects) {
     (kernel, placement, effects)
 }
 
-/// The kernels of every scene: with as few and with as many effects as settings can bring, in all forms.
-fn kernels(scene: &Scene) -> Vec<(Kernel, Placement, Effects)> {
+/// What is asked of a scene's kernel.
+struct Linked {
+    file: PathBuf,
+    effects: Effects,
+    bindings: Vec<Binding>,
+    loops: Vec<String>,
+}
+
+/// The kernels of every scene: with as few and with as many effects as settings can bring, in all forms. Linked
+/// once for all tests.
+fn kernels() -> &'static [Linked] {
+    static KERNELS: LazyLock<Vec<Linked>> =
+        LazyLock::new(|| scene_files().into_iter().flat_map(kernels_of).collect());
+    &KERNELS
+}
+
+fn kernels_of(file: PathBuf) -> Vec<Linked> {
+    let scene = scene_file(&file);
     let few = Settings {
         integrator: Integrator::Lecture { termination: 0.2 },
         sampler: Sampler::Independent,
-        ..Settings::for_scene(scene)
+        ..Settings::for_scene(&scene)
     };
     let many = Settings {
         adaptive: true,
         classes: true,
         features: true,
-        ..Settings::for_scene(scene)
+        ..Settings::for_scene(&scene)
     };
     let table = Settings {
         light_sampling: LightSampling::Cone,
@@ -378,7 +399,13 @@ fn kernels(scene: &Scene) -> Vec<(Kernel, Placement, Effects)> {
                 geometry,
                 ..settings.clone()
             };
-            all.push(kernel(scene, &settings));
+            let (kernel, _, effects) = kernel(&scene, &settings);
+            all.push(Linked {
+                file: file.clone(),
+                effects,
+                bindings: kernel.bindings("render"),
+                loops: kernel.loops(),
+            });
         }
     }
     all
@@ -388,25 +415,22 @@ fn kernels(scene: &Scene) -> Vec<(Kernel, Placement, Effects)> {
 #[test]
 fn few_storage_buffers_are_bound() {
     let mut most = 0;
-    for file in scene_files() {
-        let scene = scene_file(&file);
-        for (kernel, _, effects) in kernels(&scene) {
-            let bindings = kernel.bindings("render");
-            let buffers = bindings.iter().filter(|b| b.storage_buffer).count();
-            let names: Vec<_> = effects.names().collect();
-            let binds_scene = bindings.iter().any(|b| b.name == "scene");
-            assert_eq!(
-                buffers,
-                2 + usize::from(binds_scene) + usize::from(effects.has(Effect::RadianceCache)),
-                "{file:?} with {names:?}"
-            );
-            let reads_scene = effects.keeps_spheres()
-                || effects.has(Effect::Table)
-                || effects.has_textures()
-                || effects.has_mixes();
-            assert_eq!(binds_scene, reads_scene, "{file:?} with {names:?}");
-            most = most.max(buffers);
-        }
+    for linked in kernels() {
+        let (file, bindings, effects) = (&linked.file, &linked.bindings, &linked.effects);
+        let buffers = bindings.iter().filter(|b| b.storage_buffer).count();
+        let names: Vec<_> = effects.names().collect();
+        let binds_scene = bindings.iter().any(|b| b.name == "scene");
+        assert_eq!(
+            buffers,
+            2 + usize::from(binds_scene) + usize::from(effects.has(Effect::RadianceCache)),
+            "{file:?} with {names:?}"
+        );
+        let reads_scene = effects.keeps_spheres()
+            || effects.has(Effect::Table)
+            || effects.has_textures()
+            || effects.has_mixes();
+        assert_eq!(binds_scene, reads_scene, "{file:?} with {names:?}");
+        most = most.max(buffers);
     }
     // What adapters are asked for is what is needed.
     assert_eq!(most, STORAGE_BUFFERS as usize);
@@ -461,16 +485,13 @@ fn accounted(effects: &Effects) -> Vec<&'static str> {
 #[test]
 fn every_loop_is_accounted_for() {
     let mut found = BTreeSet::new();
-    for file in scene_files() {
-        let scene = scene_file(&file);
-        for (kernel, _, effects) in kernels(&scene) {
-            let mut loops = kernel.loops();
-            loops.sort_unstable();
-            let names: Vec<_> = effects.names().collect();
-            assert_eq!(loops, accounted(&effects), "{file:?} with {names:?}");
-            let used = (0..LOOPS.len()).filter(|i| (LOOPS[*i].used)(&effects));
-            found.extend(used);
-        }
+    for linked in kernels() {
+        let (file, effects) = (&linked.file, &linked.effects);
+        let mut loops = linked.loops.clone();
+        loops.sort_unstable();
+        let names: Vec<_> = effects.names().collect();
+        assert_eq!(loops, accounted(effects), "{file:?} with {names:?}");
+        found.extend((0..LOOPS.len()).filter(|i| (LOOPS[*i].used)(effects)));
     }
     // All the loops that there are were among them.
     assert_eq!(found.len(), LOOPS.len());

@@ -41,12 +41,13 @@ fn gray(v: [f64; 3]) -> f64 {
     v.iter().sum()
 }
 
+/// Renders of the same that are compared.
+const SEEDS: u64 = 24;
+
 /// What estimates of the variance of the mean are beyond the mean's actual variance, relative, in
-/// standard errors, and the ratio of both. `render` gives every pixel's mean and estimate for a seed.
-fn bars(pixels: usize, render: impl Fn(u64) -> Vec<(DVec3, f64)>) -> (f64, f64) {
-    const SEEDS: u64 = 24;
-    let runs: Vec<Vec<(DVec3, f64)>> = (0..SEEDS).map(render).collect();
-    let n = SEEDS as f64;
+/// standard errors, and the ratio of both. `runs` has every pixel's mean and estimate for each seed.
+fn bars(runs: &[Vec<(DVec3, f64)>]) -> (f64, f64) {
+    let (n, pixels) = (runs.len() as f64, runs[0].len());
     let (mut excess, mut actual) = (Vec::new(), 0.0);
     for i in 0..pixels {
         let mean = runs.iter().map(|run| run[i].0).sum::<DVec3>() / n;
@@ -79,14 +80,19 @@ fn error_bars_are_true() {
         // Scrambles of 4, of 4 and 16, and in the long form of all lengths.
         let all: &[u64] = &[64, 256, 512];
         for &spp in &all[..if crate::thorough::thorough() { 3 } else { 2 }] {
-            let (z, ratio) = bars(400, |seed| {
-                let film = render_gpu(&scene, &small(&scene, sampler, spp, seed));
+            let mut renderer = gpu_renderer(&scene, &small(&scene, sampler, spp, 0));
+            let mut runs = Vec::new();
+            for seed in 0..SEEDS {
+                renderer = renderer.with_seed(seed);
+                let outcome = render_quietly(&mut renderer, &small(&scene, sampler, spp, seed));
+                let film = outcome.unwrap_or_else(|e| panic!("{e}")).film;
                 let of = |i| {
                     let variance = film.variance_of_mean(i).expect("16 batches");
                     (DVec3::from(film.mean(i)), gray(variance))
                 };
-                (0..400).map(of).collect()
-            });
+                runs.push((0..400).map(of).collect());
+            }
+            let (z, ratio) = bars(&runs);
             eprintln!("{sampler:?}, {spp} spp: ratio {ratio:.3}, z = {z:.2}");
             assert!(z.abs() < 3.9, "{sampler:?}, {spp} spp: {z}");
         }
@@ -100,13 +106,15 @@ fn companion_samples_of_a_scramble_are_not_independent() {
     let placement = Placement::new(&scene, 20, 20);
     let z = |sampler| {
         // Of every other pixel, and of every other line.
-        let (z, ratio) = bars(100, |seed| {
+        let run = |seed| {
             let settings = small(&scene, sampler, 256, seed);
             let tracer = PathTracer::new(&scene, &placement, &settings);
             (0..100)
                 .map(|i| single_samples(&tracer, [i % 10 * 2, i / 10 * 2]))
                 .collect()
-        });
+        };
+        let runs: Vec<_> = (0..SEEDS).map(run).collect();
+        let (z, ratio) = bars(&runs);
         eprintln!("{sampler:?}: ratio {ratio:.3}, z = {z:.2}");
         z
     };

@@ -46,15 +46,16 @@ fn samples(context: &Context) -> Result<Measure> {
 
 /// Every case of every material, or of each form the first. Disturbed, the twin's normal is turned.
 fn materials(context: &Context, integrator: Integrator) -> Result<Vec<Outcome>> {
-    let subjects = Subjects::all(&context.gpu, integrator)?;
     let count = context.size(100_000, 1_000_000);
     let mut outcomes = Vec::new();
-    for subject in subjects.first_of_each_form(context.size(1, usize::MAX)) {
-        // Delta lobes are the same whatever the integrator.
-        if integrator == Integrator::Bsdf || subjects.is_uniform(subject) {
-            let wrong = context.disturbed(0.2) - 1.0;
-            let draws = Draw::all(&subjects, subject, count)?;
-            outcomes.extend(draws.iter().map(|draw| draw.follows(wrong)));
+    for subjects in Subjects::each(&context.gpu, integrator)? {
+        for subject in subjects.first_of_each_form(context.size(1, usize::MAX)) {
+            // Delta lobes are the same whatever the integrator.
+            if integrator == Integrator::Bsdf || subjects.is_uniform(subject) {
+                let wrong = context.disturbed(0.2) - 1.0;
+                let draws = Draw::all(&subjects, subject, count)?;
+                outcomes.extend(draws.iter().map(|draw| draw.follows(wrong)));
+            }
         }
     }
     Ok(outcomes)

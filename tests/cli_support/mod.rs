@@ -247,6 +247,27 @@ impl Background {
         assert!(status.is_ok_and(|status| status.success()), "kill -{name}");
     }
 
+    /// Waits until it has computed for so long: what it does by then does not depend on what else runs.
+    pub(crate) fn wait_for_work(&mut self, time: Duration) {
+        while self.runs() && self.computed().is_none_or(|done| done < time) {
+            sleep(Duration::from_millis(10));
+        }
+    }
+
+    /// The processor's time that all its threads have had, where the system says it; elsewhere all that there is.
+    fn computed(&self) -> Option<Duration> {
+        if !cfg!(target_os = "linux") {
+            sleep(Duration::from_millis(500));
+            return Some(Duration::MAX);
+        }
+        let stat = std::fs::read_to_string(format!("/proc/{}/stat", self.child.id())).ok()?;
+        // Behind the name in brackets `utime` and `stime` are the 12th and 13th, in hundredths of a second.
+        let (_, numbers) = stat.rsplit_once(')')?;
+        let mut numbers = numbers.split_whitespace().skip(11);
+        let mut next = || numbers.next()?.parse::<u64>().ok();
+        Some(Duration::from_millis(10 * (next()? + next()?)))
+    }
+
     /// Whether it still runs.
     pub(crate) fn runs(&mut self) -> bool {
         self.child

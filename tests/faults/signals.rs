@@ -42,7 +42,7 @@ fn a_hangup_that_comes_twice_waits_and_one_that_is_ignored_does_nothing() {
     let mut run = Background::start(&folder, arguments);
     run.wait_for("effects:");
     // A signal before the first path would end it rightly.
-    sleep(Duration::from_millis(500));
+    run.wait_for_work(Duration::from_millis(500));
     for _ in 0..2 {
         run.signal("HUP");
         sleep(Duration::from_millis(200));

@@ -25,11 +25,16 @@ Further arguments choose tests, the same on every driver, and options of their h
 /// Set to 1 for tests that have a long form.
 const LONG_FORMS: &str = "GPU_TRACE_TEST_ALL";
 
-/// Tests that one driver answers for all: those that open no GPU; those of files, options, processes and
-/// studies, to which a GPU is one like another; and those of light transport, whose formulas are asked
-/// on every driver by the others, one by one (`functions`, `materials`, `check`) and in whole images
-/// (`agreement`, `hazards`). All other files of `tests/` run on every driver.
-const ONCE: [&str; 35] = [
+/// What another driver may answer differently is what stands between the kernel's sources and its machine: how
+/// naga and the driver translate functions, loops, layouts of structs, bindings, and limits; what their arithmetic
+/// keeps; buffers and textures; how a render goes on in the next dispatch. That is asked there by single functions
+/// (`functions`, `materials`, `sobol` and others, and by [`CASES`]), by a kernel of everything (`prices`), and by a few
+/// images on the same paths as those of the reference (`agreement`, `motion`, `sky`, `textures`). Statistics of light
+/// transport, and more scenes of the same functions, say that again: the first driver has them.
+///
+/// The files of `tests/` that one driver answers for all: those that open no GPU; those of files, options,
+/// processes and studies, to which a GPU is one like another; those of light transport.
+const ONCE: [&str; 37] = [
     "albedo_variance",
     "car_paint",
     "choice",
@@ -42,6 +47,7 @@ const ONCE: [&str; 35] = [
     "containment",
     "converge",
     "coverage",
+    "dispersion",
     "distribution",
     "effects",
     "film_files",
@@ -49,6 +55,7 @@ const ONCE: [&str; 35] = [
     "furnace",
     "fuzz",
     "gpu_trace",
+    "hazards",
     "input",
     "job",
     "ledger",
@@ -67,34 +74,129 @@ const ONCE: [&str; 35] = [
     "xtask",
 ];
 
-/// Of these only what the filter finds runs on every driver: devices that fail.
-const PARTLY: [(&str, &str); 1] = [("faults", "device")];
+/// The files of which only these tests run on every driver, for the reasons above. All other files do as a whole.
+const PARTLY: [(&str, &[&str]); 14] = [
+    (
+        "absorption",
+        &[
+            "a_ball_seen_through_its_centre_absorbs_along_its_diameter",
+            "transmittance_is_beers",
+        ],
+    ),
+    // Which tiles are rendered, and that it goes on where it was.
+    (
+        "adaptive",
+        &[
+            "device_and_host_take_the_same_samples",
+            "timing_changes_no_bits",
+        ],
+    ),
+    // Kernels that no other file has.
+    (
+        "agreement",
+        &[
+            "of_coincident_spheres_the_first_wins",
+            "other_kernels_agree_with_the_reference",
+            "the_radiance_cache_agrees_with_the_reference",
+        ],
+    ),
+    // Sums beside the image.
+    (
+        "aov",
+        &[
+            "both_renderers_have_the_same_layers",
+            "the_image_is_the_same_with_and_without",
+            "what_is_seen_first_is_where_it_is",
+        ],
+    ),
+    // Cases are asked one by one: see `CASES`.
+    ("check", &["the_driver_keeps_what_the_kernel_needs"]),
+    (
+        "faults",
+        &[
+            "a_device_that_fails_costs_no_sample_that_was_done",
+            "a_scene_beyond_the_devices_limits_is_an_error",
+        ],
+    ),
+    // Single functions, and the same paths by every way to sample lamps.
+    (
+        "lights",
+        &[
+            "both_backends_sample_the_same_lights",
+            "cone_directions_are_uniform",
+            "cones_keep_their_digits",
+            "weights_share_all_that_there_is",
+        ],
+    ),
+    // What drivers do to long loops; not what is bound and looped over, which the kernel's text says.
+    (
+        "limits",
+        &[
+            "a_path_longer_than_any_dispatch_is_an_error_or_right",
+            "a_path_within_which_a_loop_ends_is_an_error_or_right",
+            "bindings_are_found_by_name",
+            "large_images_stop_between_their_parts",
+            "more_bounces_than_a_loop_may_have_in_one_dispatch",
+            "more_spheres_than_a_loop_may_visit_in_one_dispatch",
+            "paths_in_a_tree_go_on_in_the_next_dispatch",
+        ],
+    ),
+    (
+        "motion",
+        &[
+            "all_geometries_have_one_image",
+            "images_and_layers_are_those_of_the_reference",
+        ],
+    ),
+    // A kernel of everything.
+    ("prices", &["unused_effects_change_no_image"]),
+    ("radiance_cache", &["dark_cells_are_cells"]),
+    (
+        "samplers",
+        &[
+            "samples_are_a_function_of_seed_pixel_and_index",
+            "the_same_paths_and_error_bars_on_device_and_host",
+        ],
+    ),
+    (
+        "sky",
+        &[
+            "densities_agree_where_paths_arrive",
+            "directions_are_drawn_by_their_density",
+            "every_geometry_has_the_same_paths_as_the_reference",
+            "gradients_agree",
+            "images_agree_with_the_reference",
+            "lookups_agree",
+            "parts_are_exact",
+            "turns_agree",
+        ],
+    ),
+    (
+        "textures",
+        &[
+            "a_huge_ground_is_that_of_f64",
+            "a_roughness_may_be_smooth_in_places",
+            "at_the_axis_the_first_row_is_seen",
+            "gradients_are_those_of_the_device",
+            "image_lookups_agree",
+            "materials_are_what_their_textures_say",
+            "noises_agree",
+            "the_layer_albedo_shows_the_texture",
+        ],
+    ),
+];
 
 /// Tests of the other files of which one driver's answer is enough: companions, since that a test can fail
-/// is no matter of the driver; those that link kernels and run none; and those of light transport, as above.
-const SKIPPED: [&str; 22] = [
+/// is no matter of the driver; those that run no kernel; and those of light transport, as above.
+const SKIPPED: [&str; 8] = [
     "companion",
-    "a_constant_index_is_that_of_the_plain_glass_in_the_mean",
-    "a_moving_lamp_is_the_mean_of_its_frames",
-    "all_estimators_converge_to_the_same",
-    "colours_come_in_their_order",
-    "error_bars_are_true",
-    "every_estimator_has_the_same_classes",
-    "every_loop_is_accounted_for",
-    "few_storage_buffers_are_bound",
+    "every_scene_by_the_tree_is_that_of_the_list",
+    "every_sphere_is_in_every_box_around_it",
     "glsl_has_the_same_layouts",
     "lamps_are_found_on_both_sides",
-    "lamps_are_not_sampled_from_within",
-    "lamps_close_by_and_walls_are_sampled_without_bias",
     "light_goes_both_ways",
-    "nothing_is_too_dark",
-    "the_classes_add_up_to_the_image",
-    "the_program_says_what_moves",
-    "the_reference_without_light_sampling_agrees",
-    "ways_that_cannot_be_are_refused_with_their_lines",
-    "what_does_not_move_has_no_motion_in_its_kernel",
-    "what_is_decided_holds_at_all_times",
-    "whatever_moves_is_the_mean_of_its_frames",
+    "neighbouring_seeds_are_uncorrelated",
+    "what_is_apart_is_beside_the_tree",
 ];
 
 /// These take longest, and so begin first.
@@ -102,8 +204,10 @@ const LONGEST: [&str; 5] = ["effects", "lights", "samplers", "price", "check"];
 
 /// What the program is asked on every driver after the tests.
 const COMMANDS: [&[&str]; 2] = [&["devices"], &["check", "--quick"]];
-/// The file `check` of the tests has all cases, so that one shows that the program has them too.
-const ONE_CASE: [&str; 2] = ["--case", "35"];
+/// The file `check` of the tests has all cases on the first driver, so that one shows that the program has them too.
+const ONE_CASE: &str = "35";
+/// On the others those of arithmetic that is the driver's, and of buffers and dispatches.
+const CASES: &str = "1,3,6,9,16,17,22,23,33,34,35,36,37,42,43";
 
 /// Runs the tests that `arguments` choose.
 ///
@@ -139,7 +243,7 @@ pub(crate) fn all(arguments: &[String]) -> Result<(), String> {
         .adapter()
         .ok_or_else(|| format!("the program finds no usable adapter on {}", driver.name))?;
     let part = |driver, adapter, elsewhere| Part {
-        commands: commands(long),
+        commands: commands(long, elsewhere),
         tests: choose(&tests, &filters, elsewhere),
         options: options.iter().map(|&o| o.to_owned()).collect(),
         driver,
@@ -200,10 +304,11 @@ fn choose(tests: &[Tests], filters: &[&str], elsewhere: bool) -> Vec<Tests> {
         .collect();
     for tests in &mut chosen {
         let part = PARTLY.iter().find(|(name, _)| *name == tests.name);
+        let (_, part) = part.copied().unzip();
         tests.retain(|case| filters.is_empty() || any(case, filters));
         if elsewhere {
             tests.retain(|case| !any(case, &SKIPPED));
-            tests.retain(|case| part.is_none_or(|(_, part)| case.contains(part)));
+            tests.retain(|case| part.is_none_or(|part| part.contains(&last(case))));
         }
     }
     chosen.retain(|tests| !tests.is_empty());
@@ -212,12 +317,20 @@ fn choose(tests: &[Tests], filters: &[&str], elsewhere: bool) -> Vec<Tests> {
     chosen
 }
 
-fn commands(long: bool) -> Vec<Command> {
+/// The name of a test without those of its modules.
+fn last(case: &str) -> &str {
+    case.rsplit("::").next().unwrap_or(case)
+}
+
+fn commands(long: bool, elsewhere: bool) -> Vec<Command> {
+    let cases = if elsewhere { CASES } else { ONE_CASE };
     let all = COMMANDS.iter().map(|arguments| {
         let mut command = Command::new(program("debug"));
         command.args(*arguments);
         if !long && arguments.contains(&"check") {
-            command.args(ONE_CASE);
+            for case in cases.split(',') {
+                command.args(["--case", case]);
+            }
         }
         command
     });
@@ -267,6 +380,8 @@ fn summarize(
 
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
     use super::{LONGEST, ONCE, PARTLY, SKIPPED};
     use crate::root;
 
@@ -297,13 +412,36 @@ mod tests {
         }
     }
 
+    /// All sources in a folder or a file.
+    fn text(path: &Path) -> String {
+        if path.is_dir() {
+            let entries = std::fs::read_dir(path).expect("a folder");
+            return entries
+                .map(|e| text(&e.expect("an entry").path()))
+                .collect();
+        }
+        // Folders have other files than sources.
+        std::fs::read_to_string(path).unwrap_or_default()
+    }
+
     #[test]
     fn skipped_tests_are_there() {
-        let folder = std::fs::read_dir(root().join("tests")).expect("tests/");
-        let files = folder.filter_map(|entry| std::fs::read_to_string(entry.ok()?.path()).ok());
-        let all: String = files.collect();
+        let all = text(&root().join("tests"));
         for name in SKIPPED {
             assert!(all.contains(&format!("fn {name}")), "{name}");
+        }
+    }
+
+    /// A test that is renamed would run on one driver, in silence.
+    #[test]
+    fn chosen_tests_are_there() {
+        for (name, part) in PARTLY {
+            let place = root().join("tests").join(name);
+            let all = text(&place.with_extension("rs")) + &text(&place);
+            for test in part {
+                assert!(all.contains(&format!("fn {test}()")), "{name}: {test}");
+            }
+            assert!(part.is_sorted(), "{name}");
         }
     }
 

@@ -93,7 +93,8 @@ impl<'a> Draw<'a> {
         };
         let input = BsdfInput::new(subject, &surface, wo, [0.0; 4]);
         let mut name = format!(
-            "case {subject}, {}, eta {eta}, {degrees} degrees",
+            "case {}, {}, eta {eta}, {degrees} degrees",
+            subjects.first + subject,
             kind.name()
         );
         if kind.form().offset {

@@ -26,6 +26,8 @@ use crate::verify::{Random, ULP};
 #[derive(Debug)]
 pub struct Subjects {
     kinds: Vec<MaterialKind>,
+    /// The place of the first of them among all cases.
+    first: usize,
     lecture: bool,
     probe: BsdfProbe,
 }
@@ -40,6 +42,25 @@ impl Subjects {
         Self::of(gpu, kinds.collect(), integrator)
     }
 
+    /// The same, those of each material in a kernel without the others: drivers that execute all sides of a branch draw
+    /// many samples from it in a fraction of the time.
+    ///
+    /// # Errors
+    /// If the device fails.
+    pub fn each(gpu: &Gpu, integrator: Integrator) -> Result<Vec<Self>> {
+        let mut all = Vec::new();
+        let mut first = 0;
+        for material in ALL {
+            let subjects = Self {
+                first,
+                ..Self::of(gpu, (material.cases)(), integrator)?
+            };
+            first += subjects.kinds.len();
+            all.push(subjects);
+        }
+        Ok(all)
+    }
+
     /// These.
     ///
     /// # Errors
@@ -47,6 +68,7 @@ impl Subjects {
     pub fn of(gpu: &Gpu, kinds: Vec<MaterialKind>, integrator: Integrator) -> Result<Self> {
         Ok(Self {
             probe: BsdfProbe::new(gpu, &kinds, integrator)?,
+            first: 0,
             lecture: matches!(integrator, Integrator::Lecture { .. }),
             kinds,
         })
@@ -69,6 +91,7 @@ impl Subjects {
         });
         Ok(Self {
             probe: BsdfProbe::of(gpu, materials.collect(), Integrator::Bsdf)?,
+            first: 0,
             lecture: false,
             kinds,
         })
