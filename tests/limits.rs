@@ -386,7 +386,7 @@ fn kernels_of(file: PathBuf) -> Vec<Linked> {
     // Where there can be one.
     let cache = Settings {
         radiance_cache: true,
-        ..Settings::for_scene(scene)
+        ..Settings::for_scene(&scene)
     };
     let mut all = Vec::new();
     for settings in [few, many, table, cache] {
