@@ -8,8 +8,8 @@ use crate::variance::VarianceClass;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Claims {
     /// The expectation of every pixel is the light of the scene's paths of at most `max_bounces` scattering
-    /// events, up to rounding; with the radiance cache also of such as have as many from a cell on. What a nudge of `offset` renders is another scene; and a render that stops
-    /// by its error or its time has a number of samples that depends on these.
+    /// events, up to rounding; with the radiance cache also of such as have as many from a cell on. What a nudge
+    /// of `offset` renders is another scene; and a render that stops by its error or its time has a number of samples that depends on these.
     pub unbiased: bool,
     /// Batches of samples ([`Sampler::batch`](crate::sampler::Sampler::batch)) are independent of each
     /// other and, in a window, alike: their spread estimates the variance of the mean without bias. So it
