@@ -111,36 +111,32 @@ impl Cache {
         }
         let samples = self.cells.samples(batch);
         let step = (PATHS / samples / WORKGROUP).max(1) * WORKGROUP;
+        let mut works = Vec::new();
         let mut touched = 0;
         for number in window.start / batch..window.end.div_ceil(batch) {
             let first = number * batch;
-            let parts = (0..samples).step_by(self.most_samples as usize);
-            for (first_sample, begin) in parts.flat_map(|at| {
-                let cells = (0..cells).step_by(step as usize);
-                cells.map(move |begin| (at, begin))
-            }) {
-                let end = (begin + step).min(cells);
-                let work = PilotRecord {
+            for first_sample in (0..samples).step_by(self.most_samples as usize) {
+                works.extend((0..cells).step_by(step as usize).map(|begin| PilotRecord {
                     stream: pilot_words(seed, (first >> 32) as u32),
                     batch: first as u32,
                     begin,
-                    end,
+                    end: (begin + step).min(cells),
                     first_value: touched * self.cells.count(),
                     samples,
                     first_sample,
                     end_sample: (first_sample + self.most_samples).min(samples),
                     ..PilotRecord::zeroed()
-                };
-                let mut recording = Recording::default();
-                recording
-                    .upload(WORK, bytemuck::bytes_of(&work))
-                    .dispatch(&self.pilot, (end - begin).div_ceil(WORKGROUP));
-                engine.run(recording)?;
+                }));
             }
             touched += 1;
         }
         let values = touched * self.cells.count();
         let mut recording = Recording::default();
+        for work in &works {
+            recording
+                .upload(WORK, bytemuck::bytes_of(work))
+                .dispatch(&self.pilot, (work.end - work.begin).div_ceil(WORKGROUP));
+        }
         recording.copy(PILOT_VALUES, VALUES).read(PILOT_VALUES);
         let readings = engine.run(recording)?;
         let texels: &[[u32; 4]] = bytemuck::cast_slice(readings[PILOT_VALUES].bytes());
