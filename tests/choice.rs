@@ -233,7 +233,7 @@ fn the_command_line_says_what_is_chosen() {
     assert_eq!(stats["integrator"], "bsdf");
 }
 
-/// Rooms gain by the radiance cache, a ball under a lamp does not; figures are those of renders.
+/// Rooms gain by the radiance cache, balls under a lamp do not.
 #[test]
 fn the_radiance_cache_is_taken_where_it_pays() {
     let rivals = [Candidate::Bsdf, Candidate::RadianceCache];

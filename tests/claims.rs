@@ -219,6 +219,7 @@ fn every_estimator_holds_what_it_claims() {
         let job = job(&scene, &settings);
         let claims = job.claims();
         assert_eq!(job.variance().class, VarianceClass::Finite, "{name}");
+        assert_eq!(job.cells().is_some(), settings.radiance_cache, "{name}");
         let films = films(gpu_renderer(&scene, &settings), &settings);
         // A companion: error bars of half the length.
         let (bars, halved) = (excess(&films, 1.0), excess(&films, 0.25));
@@ -229,6 +230,8 @@ fn every_estimator_holds_what_it_claims() {
         );
         assert!(claims.has_error_bars() && claims.unbiased, "{name}");
         assert!(bars.abs() < limit, "{name}: error bars off by {bars}");
+        let dependent = films.iter().all(Film::pixels_are_dependent);
+        assert_eq!(dependent, !claims.independent_pixels, "{name}");
         assert!(halved > limit, "{name}: halved error bars by {halved}");
         assert!(apart.abs() < limit, "{name}: biased by {apart}");
         // Another: what is not claimed does not hold.

@@ -72,9 +72,6 @@ pub struct Stats {
     /// Standard errors of the image's mean, by channel, W/(sr m²); `null` where unknown. Where the radiance cache is used,
     /// pixels of a batch are not independent of each other, and these are from the batches' means over the whole image.
     pub mean_stderr: Option<[f64; 3]>,
-    /// Whether pixels of a batch are independent of each other.
-    #[serde(skip)]
-    pub independent_pixels: bool,
     /// Whether the variance, and with it the error, is one that samples can show: `finite`,
     /// `heavy-tailed`, or `infinite`, where the error is unknown.
     pub variance: VarianceClass,
@@ -179,7 +176,7 @@ impl Stats {
             Some(verdict) => metadata.with("trust", verdict.to_string()),
             None => metadata,
         };
-        let metadata = match self.mean_stderr.filter(|_| !self.independent_pixels) {
+        let metadata = match self.mean_stderr.filter(|_| self.radiance_cache) {
             Some([r, g, b]) => metadata.with("mean_stderr", format!("{r} {g} {b}")),
             None => metadata,
         };

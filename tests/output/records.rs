@@ -35,7 +35,6 @@ fn statistics() -> Stats {
         max_bounces: 64,
         radiance_cache: false,
         mean_stderr: None,
-        independent_pixels: true,
         roulette: true,
         seconds: stats::Seconds {
             total: 2.5,

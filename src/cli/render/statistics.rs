@@ -57,7 +57,6 @@ pub(super) fn statistics(
             .error
             .and_then(|_| film.variance_of_image_mean())
             .map(|variance| variance.map(f64::sqrt)),
-        independent_pixels: !film.pixels_are_dependent(),
         variance: job.variance().class,
         black: outcome.estimate.is_black(),
         non_finite: tally.non_finite,
