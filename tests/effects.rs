@@ -22,7 +22,7 @@ use gpu_trace::scene::{
     Texture, TextureImage,
 };
 use gpu_trace::settings::{GeometryChoice, Integrator, LightSampling, Offset, Settings, View};
-use gpu_trace::shader::{Stage, declared_names, link};
+use gpu_trace::shader::{Folder, Stage, declared_names, link};
 use gpu_trace::verify::Random;
 use rayon::prelude::*;
 
@@ -393,7 +393,10 @@ fn check_probes(sets: &BTreeSet<Set>) {
             let (scene, settings) = asking_for(set);
             let placement = Placement::new(&scene, settings.width, settings.height);
             let effects = Effects::of(&set.iter().copied().collect::<Vec<_>>());
-            let fault = link(Stage::Probe, &scene, &placement, &effects).err();
+            let linked = |folder| link(Stage::Probe(folder), &scene, &placement, &effects);
+            let fault = Folder::ALL
+                .into_iter()
+                .find_map(|folder| linked(folder).err());
             fault.map(|e| format!("{set:?}: {e}"))
         })
         .collect();

@@ -15,7 +15,7 @@ use gpu_trace::materials::{ALL, Form, Member, MemberKind, MemberValue, forms};
 use gpu_trace::placement::Placement;
 use gpu_trace::scene::Material;
 use gpu_trace::settings::Settings;
-use gpu_trace::shader::{Kernel, Stage, link, material_members};
+use gpu_trace::shader::{Folder, Kernel, Stage, link, material_members};
 use gpu_trace::verify::EMPTY;
 
 /// Name and offset of every member, and the size.
@@ -151,7 +151,11 @@ fn glsl_has_the_same_layouts() {
         if has("priority") && !has("dielectric") || has("dielectric") && !has("interior") {
             continue;
         }
-        for stage in [Stage::Path, Stage::Probe] {
+        for stage in Folder::ALL
+            .map(Stage::Probe)
+            .into_iter()
+            .chain([Stage::Path])
+        {
             let faults = other_in_glsl(&kernel(stage, &names).module);
             assert_eq!(faults, [""; 0], "{stage:?} of {names:?}");
         }
@@ -309,7 +313,11 @@ fn the_probes_shape_agrees() {
         outputs,
         zero
     });
-    check("Shape", &shape, &kernel(Stage::Probe, &["list"]));
+    check(
+        "Shape",
+        &shape,
+        &kernel(Stage::Probe(Folder::Core), &["list"]),
+    );
 }
 
 #[test]

@@ -462,7 +462,7 @@ fn bindings_are_found_by_name() {
     assert_eq!(kernel.bindings("no entry point"), []);
     let probe = crate::common::probe(&["list"]);
     let names = |entry: &str| {
-        let bindings = probe.kernel().bindings(entry);
+        let bindings = probe.bindings(entry);
         let mut names: Vec<String> = bindings.into_iter().map(|b| b.name).collect();
         names.sort_unstable();
         names

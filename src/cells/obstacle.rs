@@ -10,7 +10,7 @@ use crate::settings::{DEFAULT_MAX_BOUNCES, GeometryChoice, Integrator, Offset, S
 
 /// Most spheres of a scene with a cache: beyond, cells would be more than what they save.
 const MOST_SPHERES: usize = 64;
-/// Most bounces: a pilot's sample then fits what drivers let an invocation do, whatever spheres there are.
+/// Most bounces: a pilot's path then fits what drivers let an invocation do, whatever spheres there are.
 const MOST_BOUNCES: u32 = 128;
 
 /// Whether all that a sphere does is to reflect by Lambert's law, with a light of its own or not.

@@ -31,7 +31,7 @@ pub(super) fn rows() -> Vec<Row> {
             },
         )
         .excludes([Effect::Gradient, Effect::Sky])
-        .marks(["light::environment", "ENVIRONMENT"]),
+        .marks(["ENVIRONMENT"]),
         Row::new(
             Effect::Gradient,
             "gradient",
@@ -43,7 +43,7 @@ pub(super) fn rows() -> Vec<Row> {
         )
         .excludes([Effect::Sky])
         .marks([
-            "light::gradient",
+            "gradient_radiance",
             "GRADIENT_ZENITH",
             "GRADIENT_HORIZON",
             "GRADIENT_GROUND",
@@ -59,13 +59,7 @@ pub(super) fn rows() -> Vec<Row> {
                 })
             },
         )
-        .marks([
-            "light::sky",
-            "SKY_WIDTH",
-            "SKY_HEIGHT",
-            "SKY_TURN",
-            "receive_sky",
-        ]),
+        .marks(["light::sky", "SKY_WIDTH", "SKY_HEIGHT", "SKY_TURN"]),
         Row::new(
             Effect::Lights,
             "lights",
@@ -89,6 +83,7 @@ pub(super) fn rows() -> Vec<Row> {
             "limb_distance",
             "share_of_emission",
             "light_weight",
+            "LAMP_SHARE",
             "LIGHT_COUNT",
             "both_sides",
         ]),
@@ -103,7 +98,7 @@ pub(super) fn rows() -> Vec<Row> {
         .marks([
             "light::skylight",
             "share_of_sky",
-            "radiance_of",
+            "SKY_SHARE",
             "SKY_TABLE_WIDTH",
         ]),
         Row::new(

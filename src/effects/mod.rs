@@ -480,6 +480,7 @@ impl Effects {
             ("textured", self.has_textures()),
             ("patterned", self.has_patterns()),
             ("flaked", self.has_flakes()),
+            ("mixes", self.has_mixes()),
             ("mix_deltas", self.mixes_deltas()),
             ("mixed_textures", self.has_mixes() && self.has_textures()),
             ("weighed", self.weighs_lights()),

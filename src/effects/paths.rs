@@ -66,6 +66,12 @@ pub(super) fn rows() -> Vec<Row> {
         ])
         .marks([
             "cache",
+            "cell_values",
+            "texel_of",
+            "cell_place",
+            "begin_at",
+            "begin_on",
+            "density",
             "Path::plain",
             "Path::arrived",
             "Path::arrives_at",
@@ -76,6 +82,7 @@ pub(super) fn rows() -> Vec<Row> {
             "batch_sums",
             "BATCHES",
             "pilot",
+            "fill_cell",
             "CORRECTED",
             "chart_of",
             "charts",

@@ -14,7 +14,7 @@ pub struct Role {
 impl Effects {
     /// Which file plays which role.
     #[must_use]
-    pub fn roles(&self) -> [Role; 7] {
+    pub fn roles(&self) -> [Role; 10] {
         let has = |effect| self.has(effect);
         let geometry = match (self.keeps_spheres(), has(Effect::Bvh)) {
             (false, _) => None,
@@ -36,10 +36,27 @@ impl Effects {
             (true, false) => Some("light/weighed"),
             (true, true) => Some("light/table"),
         };
+        let target = match (has(Effect::Lights), has(Effect::Skylight)) {
+            (false, false) => None,
+            (true, false) => Some("light/target/lamps"),
+            (false, true) => Some("light/target/sky"),
+            (true, true) => Some("light/target/both"),
+        };
         let share = match (self.samples_light(), has(Effect::Mis)) {
             (false, _) => None,
             (true, false) => Some("light/nee"),
             (true, true) => Some("light/mis"),
+        };
+        let surround = [
+            (Effect::Environment, "light/surround/constant"),
+            (Effect::Gradient, "light/surround/gradient"),
+            (Effect::Sky, "light/surround/sky"),
+        ];
+        let surround = surround.into_iter().find(|(effect, _)| has(*effect));
+        let surround = surround.map_or("light/surround/none", |(_, file)| file);
+        let continuation = match has(Effect::RadianceCache) {
+            true => "cache/cells",
+            false => "path/continuation/traced",
         };
         let termination = match (has(Effect::Lecture), has(Effect::Roulette)) {
             (true, _) => "path/termination/constant",
@@ -52,7 +69,10 @@ impl Effects {
             ("media", media),
             ("sampler", Some(sampler)),
             ("lights", lights),
+            ("target", target),
             ("share", share),
+            ("surround", Some(surround)),
+            ("continuation", Some(continuation)),
             ("termination", Some(termination)),
         ]
         .map(|(name, file)| Role { name, file })

@@ -76,9 +76,7 @@ pub(super) fn rows() -> Vec<Row> {
         ])
         .marks([member]);
         match *key {
-            EMISSION => row
-                .needs([Effect::Emission])
-                .marks(["emission_at", "radiance_seen"]),
+            EMISSION => row.needs([Effect::Emission]).marks(["emission_at"]),
             name => {
                 let row = row.needs(forms_that(|form| form.texturable().any(|t| t.key == name)));
                 match name {

@@ -1,6 +1,6 @@
 //! Single functions of the kernel on a device: for tests, and for the hazard suite.
 //!
-//! Every function has an entry point `probe_<function>` in `shaders/probe.wesl`, where its rows are
+//! Every function has an entry point `probe_<function>` in `shaders/probe/`, where its rows are
 //! listed. An invocation reads a few rows of four 32-bit words and writes a few; here a row is
 //! `[f32; 4]` or `[u32; 4]`, and an invocation's rows are an array or a `repr(C)` struct of these.
 
@@ -17,7 +17,7 @@ use crate::gpu::engine::{Engine, Pass, Program, Recording};
 use crate::gpu::layout::CameraRecord;
 use crate::placement::Placement;
 use crate::scene::Scene;
-use crate::shader::{Kernel, Stage, link};
+use crate::shader::{Binding, Folder, Stage, link};
 
 /// Bytes of a row.
 const ROW: usize = 16;
@@ -26,7 +26,7 @@ const WORKGROUP: usize = 64;
 /// Invocations of a dispatch: well within the workgroups that every device allows, and short.
 const DISPATCH: usize = 1 << 18;
 
-/// `Shape` of `shaders/probe.wesl`.
+/// `Shape` of `shaders/probe/rows.wesl`.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub struct ShapeRecord {
@@ -44,11 +44,17 @@ pub struct ShapeRecord {
 #[derive(Debug)]
 pub struct Probe {
     gpu: Gpu,
-    program: Program,
     camera: CameraRecord,
-    data: SceneBytes,
+    folders: BTreeMap<Folder, Linked>,
     /// Functions that were called, by name: a driver takes seconds to compile a large one.
     compiled: Mutex<BTreeMap<String, Arc<Pass>>>,
+}
+
+/// The functions of a folder.
+#[derive(Debug)]
+struct Linked {
+    program: Program,
+    data: SceneBytes,
 }
 
 impl Probe {
@@ -58,23 +64,34 @@ impl Probe {
     /// # Errors
     /// [`Error::Shader`] if they do not link, [`Error::Gpu`] if the device refuses them.
     pub fn new(gpu: &Gpu, scene: &Scene, placement: &Placement, effects: &Effects) -> Result<Self> {
-        let kernel = link(Stage::Probe, scene, placement, effects)?;
-        let program = Program::new(gpu, "probe", kernel);
-        gpu.check()?;
-        let data = SceneBytes::new(program.kernel(), scene, placement, effects);
+        let mut folders = BTreeMap::new();
+        for folder in Folder::ALL {
+            let kernel = link(Stage::Probe(folder), scene, placement, effects)?;
+            let program = Program::new(gpu, "probe", kernel);
+            gpu.check()?;
+            let data = SceneBytes::new(program.kernel(), scene, placement, effects);
+            folders.insert(folder, Linked { program, data });
+        }
         Ok(Self {
             gpu: gpu.clone(),
-            data,
-            program,
+            folders,
             camera: CameraRecord::new(&placement.camera),
             compiled: Mutex::default(),
         })
     }
 
-    /// The kernel in use.
+    /// The kernel that has the entry point `entry`, and what it reads of the scene.
+    fn linked(&self, entry: &str) -> Option<&Linked> {
+        let linked = &self.folders[&Folder::with(entry)?];
+        let mut entries = linked.program.kernel().module.entry_points.iter();
+        entries.any(|e| e.name == entry).then_some(linked)
+    }
+
+    /// What the entry point `entry` binds; nothing if no effect in use brings it.
     #[must_use]
-    pub fn kernel(&self) -> &Kernel {
-        self.program.kernel()
+    pub fn bindings(&self, entry: &str) -> Vec<Binding> {
+        let kernel = self.linked(entry).map(|linked| linked.program.kernel());
+        kernel.map_or(vec![], |kernel| kernel.bindings(entry))
     }
 
     /// Calls `function` once for each of `inputs`.
@@ -95,11 +112,15 @@ impl Probe {
             0,
             "outputs of {function} are not whole rows"
         );
-        let pass = self.compiled(function)?;
+        let entry = format!("probe_{function}");
+        let linked = self
+            .linked(&entry)
+            .ok_or_else(|| Error::Shader(format!("the kernel has no function {function}")))?;
+        let pass = self.compiled(linked, &entry)?;
         let mut engine = Engine::new(self.gpu.clone());
         let mut outputs = Vec::with_capacity(inputs.len());
         let mut data = Recording::default();
-        self.data.upload(&mut data, &pass);
+        linked.data.upload(&mut data, &pass);
         engine.run(data)?;
         for part in inputs.chunks(DISPATCH) {
             let shape = ShapeRecord {
@@ -123,21 +144,14 @@ impl Probe {
         Ok(outputs)
     }
 
-    /// The function, compiled once.
-    fn compiled(&self, function: &str) -> Result<Arc<Pass>> {
+    /// The entry point, compiled once.
+    fn compiled(&self, linked: &Linked, entry: &str) -> Result<Arc<Pass>> {
         let mut compiled = self.compiled.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(pass) = compiled.get(function) {
+        if let Some(pass) = compiled.get(entry) {
             return Ok(pass.clone());
         }
-        let entry = format!("probe_{function}");
-        let mut entries = self.kernel().module.entry_points.iter();
-        if !entries.any(|e| e.name == entry) {
-            return Err(Error::Shader(format!(
-                "the kernel has no function {function}"
-            )));
-        }
-        let pass = Arc::new(self.program.pass(&self.gpu, &entry, &[])?);
-        compiled.insert(function.to_owned(), pass.clone());
+        let pass = Arc::new(linked.program.pass(&self.gpu, entry, &[])?);
+        compiled.insert(entry.to_owned(), pass.clone());
         Ok(pass)
     }
 }

@@ -112,7 +112,6 @@ impl GpuRenderer {
         let cache = cells.map(|cells| Cache::new(&gpu, &program, &constants, cells, most_samples));
         let cache = cache.transpose()?;
 
-        let gl = gpu.summary.backend == "gl";
         let mut engine = Engine::new(gpu);
         engine.buffer(PARTIALS, partials);
         engine.buffer(COUNTERS, size_of::<CountersRecord>() as u64);
@@ -157,7 +156,7 @@ impl GpuRenderer {
                 Some(_) => 1.0,
             },
             pace: Pace::unknown(),
-            step_limit: step_limit(placement, effects, settings.max_bounces, gl),
+            step_limit: step_limit(placement, effects, settings.max_bounces),
         })
     }
 

@@ -95,8 +95,42 @@ impl Kernel {
 pub enum Stage {
     /// The path tracer (`shaders/path.wesl`).
     Path,
-    /// Single functions, for tests (`shaders/probe.wesl`).
-    Probe,
+    /// Single functions, for tests (`shaders/probe/`).
+    Probe(Folder),
+}
+
+/// The folder of `shaders/` whose functions a probe has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[expect(missing_docs, reason = "named as they are")]
+pub enum Folder {
+    Core,
+    Scene,
+    Materials,
+    Light,
+}
+
+impl Folder {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Core, Self::Scene, Self::Materials, Self::Light];
+
+    fn root(self) -> &'static str {
+        match self {
+            Self::Core => "probe/core",
+            Self::Scene => "probe/scene",
+            Self::Materials => "probe/materials",
+            Self::Light => "probe/light",
+        }
+    }
+
+    /// The one whose probe has the entry point `entry`, for some effects.
+    #[must_use]
+    pub fn with(entry: &str) -> Option<Self> {
+        let declared = format!("fn {entry}(");
+        Self::ALL.into_iter().find(|folder| {
+            let mut sources = sources::ALL.iter();
+            sources.any(|(path, text)| *path == folder.root() && text.contains(&declared))
+        })
+    }
 }
 
 /// Links the kernel of `stage` for `scene` with exactly `effects`.
@@ -191,15 +225,15 @@ fn link_from(
     }
     let root = match stage {
         Stage::Path => "path",
-        Stage::Probe => "probe",
+        Stage::Probe(folder) => folder.root(),
     };
     let mut linked = compiler
         .compile(&module_path(root))
         .map_err(|e| Error::Shader(format!("the kernel does not link: {e}")))?;
     binding::number(&mut linked.syntax);
-    let wgsl = linked.to_string();
     // The linker's order varies from run to run; declarations may stand in any.
-    let mut declarations: Vec<&str> = wgsl.split("\n\n").map(str::trim).collect();
+    let declarations = linked.syntax.global_declarations.iter();
+    let mut declarations: Vec<String> = declarations.map(|d| d.to_string().trim().into()).collect();
     declarations.sort_unstable();
     let wgsl = declarations.join("\n\n") + "\n";
     let (module, info) = validate(&wgsl)?;

@@ -10,7 +10,7 @@
 //! itself (`tree_steps`), and an invocation starts no further path beyond a quarter of what it may make. That
 //! is not enough: llvmpipe counts the iterations of some invocations together, eight on most machines, and these
 //! differ in a tree. So a path that has ended asks a loop of its own whether loops still turn (`ends_loops` in
-//! `shaders/path.wesl`); if they do not, it is no sample, and the next dispatch begins it again.
+//! `shaders/path/turns.wesl`); if they do not, it is no sample, and the next dispatch begins it again.
 
 use crate::effects::{Effect, Effects};
 use crate::materials::schema::MOST_OCTAVES;
@@ -45,7 +45,7 @@ pub const LOOPS: [Loop; 18] = [
     },
     // Over those of the radiance cache's pilots, which are in no render: `paths_at_most`.
     Loop {
-        function: "pilot",
+        function: "fill_cell",
         used: |effects| effects.has(Effect::RadianceCache),
         at_vertex: |_, _| 0,
     },
@@ -212,15 +212,11 @@ pub fn vertex_steps(placement: &Placement, effects: &Effects) -> u32 {
     steps as u32
 }
 
-/// Loop iterations after which an invocation is to start no further path; `gl`: on a driver of that interface.
-///
-/// Through GL a path that was ended is at times taken for a sample all the same, where nothing but the question whether
-/// loops still turn keeps it from that (29 of 4096 in the scene of `tests/bvh.rs`). Why is not known. There eight
-/// invocations together stay below what is ended, unless their paths take thousands of iterations each.
+/// Loop iterations after which an invocation is to start no further path.
 #[must_use]
-pub fn step_limit(placement: &Placement, effects: &Effects, max_bounces: u32, gl: bool) -> u32 {
+pub fn step_limit(placement: &Placement, effects: &Effects, max_bounces: u32) -> u32 {
     if effects.has(Effect::Bvh) {
-        return (LOOP_ITERATIONS / if gl { 16 } else { 4 }) as u32;
+        return (LOOP_ITERATIONS / 4) as u32;
     }
     // A path that is begun must fit.
     let vertex = u64::from(vertex_steps(placement, effects));
@@ -234,13 +230,13 @@ pub fn step_limit(placement: &Placement, effects: &Effects, max_bounces: u32, gl
     LOOP_ITERATIONS.saturating_sub(path).max(1) as u32
 }
 
-/// The paths of the radiance cache's pilot that an invocation takes in one dispatch, at least 1: as many as fit however
-/// long they are, for its loop does not look.
+/// The paths of the radiance cache's pilot that an invocation takes in one dispatch: as many as fit however long they
+/// are, for its loop does not look. 0: there can be no such pilot.
 #[must_use]
 pub fn paths_at_most(placement: &Placement, effects: &Effects, max_bounces: u32) -> u32 {
     let vertex = u64::from(vertex_steps(placement, effects));
     let path = (u64::from(max_bounces) + 1) * vertex;
-    (LOOP_ITERATIONS / path).max(1) as u32
+    (LOOP_ITERATIONS / path) as u32
 }
 
 /// Loops of a block, those within others among them.

@@ -6,10 +6,10 @@ use glam::{DVec3, Vec3};
 use super::{Random, Row};
 use crate::placement::{PlacedSphere, Placement, Side};
 
-/// Rows of a ray for `probe_closest_hit` of `shaders/probe.wesl`.
+/// Rows of a ray for `probe_closest_hit` of `shaders/probe/scene.wesl`.
 pub type RayRows = [Row; 3];
 
-/// What `probe_closest_hit` and `probe_lamp_hit` of `shaders/probe.wesl` answer.
+/// What `probe_closest_hit` and `probe_lamp_hit` of `shaders/probe/scene.wesl` answer.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub struct HitRow {

@@ -1,4 +1,4 @@
-//! Twin of `shaders/light/environment.wesl`, `gradient.wesl` and `sky.wesl`.
+//! Twin of `shaders/light/surround/` and `shaders/light/sky.wesl`.
 
 use std::f64::consts::TAU;
 
