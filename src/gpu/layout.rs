@@ -355,7 +355,7 @@ impl ChosenTiles {
     }
 }
 
-/// `Counters` of `shaders/path.wesl`.
+/// `Counters` of `shaders/film/pixel.wesl`.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub struct CountersRecord {
@@ -371,6 +371,8 @@ pub struct CountersRecord {
     pub unfinished: u32,
     /// Samples that the last dispatch finished.
     pub advanced: u32,
+    /// Always 0, which no shader compiler knows.
+    pub zero: u32,
 }
 
 /// What a material's inner side absorbs per unit length of the kernel. Below the normal numbers of f32 it is the least

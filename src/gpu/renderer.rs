@@ -111,6 +111,7 @@ impl GpuRenderer {
         let most_samples = paths_at_most(placement, effects, settings.max_bounces);
         let cache = cells.map(|cells| Cache::new(&gpu, &program, &constants, cells, most_samples));
         let cache = cache.transpose()?;
+        let gl = gpu.summary.backend == "gl";
 
         let mut engine = Engine::new(gpu);
         engine.buffer(PARTIALS, partials);
@@ -156,7 +157,7 @@ impl GpuRenderer {
                 Some(_) => 1.0,
             },
             pace: Pace::unknown(),
-            step_limit: step_limit(placement, effects, settings.max_bounces),
+            step_limit: step_limit(placement, effects, settings.max_bounces, gl),
         })
     }
 
