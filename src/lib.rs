@@ -54,6 +54,7 @@ pub mod output;
 pub mod particles;
 pub mod placement;
 pub mod prices;
+pub mod records;
 pub mod reference;
 pub mod render;
 pub mod sampler;

@@ -623,7 +623,7 @@ fn unmarked(all: &[(Set, Arc<Linked>)]) -> BTreeMap<&str, Set> {
     with.retain(|name, effects| {
         let marked = effects.iter().any(|effect| effect.row().is_marked(name));
         // Those of a material's module are its own; the dispatch is that of what is in use, and so are the
-        // members of `Material`: see layout.rs.
+        // members of `Material`: see records/material.rs.
         let of_material = name.starts_with("materials::") || name.starts_with("bsdf::");
         let shared = of_media(name) || of_light_sampling(name);
         !effects.is_empty() && !marked && !of_material && !shared && name.contains("::")

@@ -9,7 +9,7 @@ use crate::cells::Cells;
 use crate::error::{Error, Result};
 use crate::gpu::device::Gpu;
 use crate::gpu::engine::{Engine, Pass, Program, Readings, Recording};
-use crate::gpu::layout::{CELLS_WIDTH, PilotRecord};
+use crate::records::layout::{CELLS_WIDTH, PilotRecord};
 use crate::settings::{Rect, pilot_words};
 
 /// Buffers and textures by their names in `shaders/`.

@@ -6,10 +6,10 @@ use std::sync::Arc;
 use glam::DVec3;
 use gpu_trace::effects::Effects;
 use gpu_trace::gpu::probe::Probe;
-use gpu_trace::gpu::textures::TextureTable;
 use gpu_trace::image::Picture;
 use gpu_trace::materials::lattice::LatticePoint;
 use gpu_trace::placement::Placement;
+use gpu_trace::records::textures::TextureTable;
 use gpu_trace::reference::scene::texture::{
     TexturePoint, gradient_noise, image_place, image_value, noise, texture_value,
 };

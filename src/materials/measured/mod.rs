@@ -26,7 +26,7 @@ pub use table::{BrdfTable, directions};
 
 pub(super) const NAME: &str = "measured";
 
-/// Where the material's table begins in the kernel's texture of all tables: the scene's to say (`gpu/measured.rs`).
+/// Where the material's table begins in the kernel's texture of all tables: the scene's to say (`records/measured.rs`).
 pub const START: Member = Member::word("measured_start");
 
 pub(super) const FORMS: &[Form] = &[Form {

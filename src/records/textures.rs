@@ -6,11 +6,11 @@ use std::sync::Arc;
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 
-use crate::gpu::layout::anchored_spheres;
 use crate::image::Picture;
 use crate::materials::lattice::LatticePoint;
 use crate::materials::texturable::EMISSION;
 use crate::placement::Placement;
+use crate::records::material::{Numbers, anchored_spheres};
 use crate::scene::{Material, Scene, Texture, TextureImage, Textured};
 
 /// Columns of the texture `image_texels` of `shaders/scene/texture.wesl`.
@@ -45,9 +45,6 @@ pub struct ImageRecord {
     pub scale: f32,
     pub unused: [u32; 3],
 }
-
-/// The numbers by which the kernel knows the textures of some keys.
-pub type Numbers = Vec<(&'static str, u32)>;
 
 /// Those of a part of a mix.
 #[derive(Clone, Debug, Default)]
