@@ -58,6 +58,7 @@ pub mod records;
 pub mod reference;
 pub mod render;
 pub mod sampler;
+pub mod sampling;
 pub mod scene;
 pub mod settings;
 pub mod shader;

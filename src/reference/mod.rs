@@ -5,10 +5,8 @@
 //! form. What an effect leaves out of the kernel, it computes and finds to be nothing.
 
 pub mod cells;
-pub mod core;
 pub mod light;
 pub mod path;
-pub mod purpose;
 pub mod renderer;
 pub mod scene;
 pub mod survey;

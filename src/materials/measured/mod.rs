@@ -12,7 +12,7 @@ use super::ggx::{Frame, ggx_normal, ggx_pdf};
 use super::lobes::{Lobes, Pair, arrival};
 use super::scattered::{MARGIN, gains_energy};
 use super::{Bsdf, BsdfSample, BsdfValue, Form, Member, MemberValue, Surface, Value};
-use crate::reference::core::sampling::cosine_direction;
+use crate::sampling::directions::cosine_direction;
 
 mod cases;
 mod fit;

@@ -9,7 +9,7 @@ use crate::materials::MaterialKind;
 use crate::materials::lattice::LatticePoint;
 use crate::materials::mix::Weight;
 use crate::materials::texturable::EMISSION;
-use crate::reference::core::random::mix_bits;
+use crate::sampling::random::mix_bits;
 use crate::scene::Material;
 use crate::scene::material::parameter;
 use crate::scene::texture::{Texture, TextureImage};
