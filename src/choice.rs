@@ -8,6 +8,7 @@
 
 use glam::DVec3;
 
+use crate::backend::cpu::ReferenceRenderer;
 use crate::cells::obstacle;
 use crate::effects::Effect;
 use crate::error::Result;
@@ -16,7 +17,6 @@ use crate::job::{Job, prepare};
 use crate::placement::Placement;
 use crate::reference::cells::Cache;
 use crate::reference::path::PathTracer;
-use crate::reference::renderer::ReferenceRenderer;
 use crate::reference::survey::survey;
 use crate::render::render_quietly;
 use crate::sampler::Sampler;
