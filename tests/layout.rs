@@ -6,6 +6,7 @@ use crate::common::scene;
 use glam::DVec3;
 use gpu_trace::effects::Effects;
 use gpu_trace::gpu::probe::ShapeRecord;
+use gpu_trace::materials::Material;
 use gpu_trace::materials::dielectric::Index;
 use gpu_trace::materials::{ALL, Form, Member, MemberKind, MemberValue, forms};
 use gpu_trace::placement::Placement;
@@ -14,7 +15,6 @@ use gpu_trace::records::layout::{
     PoleRecord, SphereRecord,
 };
 use gpu_trace::records::material::MaterialRecord;
-use gpu_trace::scene::Material;
 use gpu_trace::settings::Settings;
 use gpu_trace::shader::{Kernel, Stage, link, material_members};
 use gpu_trace::verify::EMPTY;

@@ -19,9 +19,9 @@ use std::collections::BTreeSet;
 use std::sync::LazyLock;
 
 use crate::materials::texturable::textured_keys;
-use crate::materials::{Form, flakes, forms, measured, mix};
+use crate::materials::{Form, Material, flakes, forms, measured, mix};
 use crate::placement::{PlacedSphere, Placement};
-use crate::scene::{Material, Scene};
+use crate::scene::Scene;
 use crate::settings::Settings;
 
 pub use geometry::{BAKED_LIMIT, BAKED_MOST};

@@ -6,9 +6,9 @@ use serde::Deserialize;
 
 use super::lobes::Lobes;
 use super::{
-    Bsdf, BsdfSample, BsdfValue, Event, Form, MaterialKind, Member, MemberValue, Surface, Value,
+    Bsdf, BsdfSample, BsdfValue, Event, Form, Material, MaterialKind, Member, MemberValue, Surface,
+    Texture, Value,
 };
-use crate::scene::{Material, Texture};
 
 pub(super) const NAME: &str = "mix";
 

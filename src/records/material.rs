@@ -4,9 +4,9 @@ use glam::DVec3;
 
 use crate::materials::dielectric::Index;
 use crate::materials::texturable::{key_values, smooth_kind, texture_member};
-use crate::materials::{Member, MemberValue, forms};
+use crate::materials::{Material, Member, MemberValue, forms};
 use crate::placement::{PlacedSphere, Placement};
-use crate::scene::{Material, Scene};
+use crate::scene::Scene;
 
 /// What a material's inner side absorbs per unit length of the kernel. Below the normal numbers of f32 it is the least
 /// of these, which is as good as nothing on any way that is not infinite.

@@ -2,13 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use crate::materials::Member;
 use crate::materials::measured::START;
+use crate::materials::{Material, Member};
 use crate::placement::{PlacedSphere, Placement};
 use crate::records::material::{MaterialRecord, anchored_spheres};
 use crate::records::measured::MeasuredTables;
 use crate::records::textures::{PartNumbers, TextureTable};
-use crate::scene::{Material, Scene};
+use crate::scene::Scene;
 
 /// A part of a mix.
 #[derive(Clone, Debug)]

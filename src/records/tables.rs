@@ -1,5 +1,6 @@
 //! All that a kernel's records of materials refer to by numbers.
 
+use crate::materials::Material;
 use crate::materials::measured::START;
 use crate::materials::mix::PARTS;
 use crate::placement::Placement;
@@ -7,7 +8,7 @@ use crate::records::material::{MaterialRecord, Numbers};
 use crate::records::measured::MeasuredTables;
 use crate::records::mix::MixTable;
 use crate::records::textures::TextureTable;
-use crate::scene::{Material, Scene};
+use crate::scene::Scene;
 
 /// Textures, tables of measured materials and parts of mixes.
 #[derive(Clone, Debug)]

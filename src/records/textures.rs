@@ -9,9 +9,10 @@ use glam::DVec3;
 use crate::image::Picture;
 use crate::materials::lattice::LatticePoint;
 use crate::materials::texturable::EMISSION;
+use crate::materials::{Material, Texture, TextureImage, Textured};
 use crate::placement::Placement;
 use crate::records::material::{Numbers, anchored_spheres};
-use crate::scene::{Material, Scene, Texture, TextureImage, Textured};
+use crate::scene::Scene;
 
 /// Columns of the texture `image_texels` of `shaders/scene/texture.wesl`.
 pub const IMAGE_WIDTH: u32 = 4096;
