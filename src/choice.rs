@@ -9,8 +9,7 @@
 use glam::DVec3;
 
 use crate::backend::cpu::ReferenceRenderer;
-use crate::cells::obstacle;
-use crate::effects::Effect;
+use crate::effects::{Effect, cache_obstacle};
 use crate::error::Result;
 use crate::film::{Estimate, Film, LEAST_SAMPLES};
 use crate::job::{Job, prepare};
@@ -252,7 +251,7 @@ fn pilot(settings: &Settings, integrator: Integrator, pixels: f64) -> Settings {
 fn with_cells(scene: &Scene, settings: &Settings, job: Job) -> Option<(Job, Vec<DVec3>)> {
     let settings = Candidate::RadianceCache.settings(settings);
     let placement = Placement::new(scene, settings.width, settings.height);
-    if obstacle(scene, &placement, &settings).is_some() {
+    if cache_obstacle(scene, &placement, &settings).is_some() {
         return None;
     }
     let cells = survey(scene, &placement, &settings);

@@ -31,7 +31,6 @@
 
 pub mod backend;
 pub mod bvh;
-pub mod cells;
 pub mod check;
 pub mod choice;
 pub mod claims;

@@ -5,11 +5,11 @@ use std::ops::Range;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use crate::cells::Cells;
 use crate::error::{Error, Result};
 use crate::film::{AovSums, BLOCK, NonFinite, PixelSums, Tally, Tiles, Window};
 use crate::job::Job;
 use crate::placement::Placement;
+use crate::placement::cells::Cells;
 use crate::reference::cells::Cache;
 use crate::reference::path::{PathResult, PathTracer};
 use crate::render::{Control, Renderer};

@@ -9,6 +9,7 @@
 
 mod geometry;
 mod light;
+mod obstacle;
 mod paths;
 mod role;
 mod samples;
@@ -25,6 +26,7 @@ use crate::scene::Scene;
 use crate::settings::Settings;
 
 pub use geometry::{BAKED_LIMIT, BAKED_MOST};
+pub use obstacle::cache_obstacle;
 pub use role::Role;
 
 /// An effect: something that a kernel can have or not.

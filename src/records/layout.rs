@@ -9,9 +9,9 @@ use std::mem::offset_of;
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 
-use crate::cells::Chart;
 use crate::effects::{Effect, Effects};
 use crate::film::{TILE, Tiles};
+use crate::placement::cells::Chart;
 use crate::placement::sky::{Band, Entry};
 use crate::placement::{Light, PlacedCamera, PlacedSphere, Placement, SkyTable};
 use crate::settings::Rect;

@@ -6,8 +6,8 @@ use std::fmt::Write as _;
 use glam::DVec3;
 
 use super::bsdf::members;
-use crate::cells::Chart;
 use crate::effects::{Effect, Effects};
+use crate::placement::cells::Chart;
 use crate::placement::{PlacedSphere, Placement, Side};
 use crate::records::layout::light_weight;
 use crate::records::material::MaterialRecord;
