@@ -5,7 +5,9 @@
 //! channel (linear RGB), and everything is f64: rounding to f32 happens in one later place only.
 
 pub mod builtin;
+pub mod color_map;
 mod describe;
+pub mod direct;
 pub mod environment;
 mod file;
 mod hash;
@@ -15,6 +17,8 @@ mod measured;
 mod mix;
 pub mod motion;
 mod named;
+mod names;
+mod parsed;
 pub mod particles;
 mod pieces;
 #[cfg(test)]
@@ -24,7 +28,9 @@ mod report;
 mod shape;
 mod suggest;
 mod texture_table;
+pub mod trajectory;
 mod validate;
+mod vector;
 
 pub use describe::summary;
 pub use environment::{Environment, Gradient, Sky};
