@@ -364,9 +364,14 @@ fn library() -> Sources {
     sources
 }
 
-/// The modules in the order in which the documentation of `src/lib.rs` names them.
-fn documented(text: &str, modules: &BTreeSet<String>) -> Vec<String> {
-    let lines = text.lines().filter(|line| line.starts_with("//!"));
+/// The modules of the top level.
+fn modules_of(sources: &Sources) -> BTreeSet<String> {
+    let modules = sources.modules.iter().filter(|names| names.len() == 1);
+    modules.map(|names| names[0].clone()).collect()
+}
+
+/// Those of `modules` that stand in backquotes in some lines, in their order.
+fn named<'t>(lines: impl Iterator<Item = &'t str>, modules: &BTreeSet<String>) -> Vec<String> {
     let mut found: Vec<String> = Vec::new();
     for name in lines.flat_map(|line| line.split('`').skip(1).step_by(2)) {
         if modules.contains(name) && !found.iter().any(|known| known == name) {
@@ -401,41 +406,40 @@ fn there_are_no_circles() {
     }
 }
 
-#[test]
-fn modules_stand_in_the_order_of_the_documentation() {
-    let sources = library();
-    let modules = sources.modules.iter().filter(|names| names.len() == 1);
-    let modules: BTreeSet<String> = modules.map(|names| names[0].clone()).collect();
-    let text = fs::read_to_string(root().join("lib.rs")).expect("src/lib.rs");
-    let order = documented(&text, &modules);
-    let missing: Vec<&String> = modules
-        .iter()
+/// That a document names every module, each after those that it uses.
+fn assert_order(document: &str, sources: &Sources, order: &[String]) {
+    let missing: Vec<String> = modules_of(sources)
+        .into_iter()
         .filter(|name| !order.contains(name))
         .collect();
-    assert!(missing.is_empty(), "src/lib.rs says nothing of {missing:?}");
-    let wrong = out_of_order(&sources.graph(&[]), &order).join("\n");
+    assert!(missing.is_empty(), "{document} says nothing of {missing:?}");
+    let wrong = out_of_order(&sources.graph(&[]), order).join("\n");
     assert!(
         wrong.is_empty(),
-        "src/lib.rs names these the other way round:\n{wrong}"
+        "{document} names these the other way round:\n{wrong}"
     );
 }
 
-/// Every module and folder is in a row of the table of `ARCHITECTURE.md`.
 #[test]
-fn the_architecture_names_every_module() {
+fn modules_stand_in_the_order_of_the_documentation() {
+    let sources = library();
+    let text = fs::read_to_string(root().join("lib.rs")).expect("src/lib.rs");
+    let lines = text.lines().filter(|line| line.starts_with("//!"));
+    let order = named(lines, &modules_of(&sources));
+    assert_order("src/lib.rs", &sources, &order);
+}
+
+/// The table of `ARCHITECTURE.md` has every module, in such an order, too.
+#[test]
+fn modules_stand_in_the_order_of_the_architecture() {
+    let sources = library();
+    let modules = modules_of(&sources);
     let text = fs::read_to_string(root().join("../ARCHITECTURE.md")).expect("ARCHITECTURE.md");
-    let rows: Vec<&str> = text
+    let rows = text
         .lines()
-        .filter_map(|line| line.strip_prefix("| ")?.split(" | ").next())
-        .flat_map(|cell| cell.split('`').skip(1).step_by(2))
-        .collect();
-    for names in library().modules.iter().filter(|names| names.len() == 1) {
-        assert!(
-            rows.contains(&names[0].as_str()),
-            "{} is in no row",
-            names[0]
-        );
-    }
+        .filter_map(|line| line.strip_prefix("| ")?.split(" | ").next());
+    let order = named(rows, &modules);
+    assert_order("ARCHITECTURE.md", &sources, &order);
 }
 
 /// A circle of three, hidden in braces, behind `super` and in a module of a module.
