@@ -40,6 +40,8 @@ pub use load::Loaded;
 
 use glam::DVec3;
 
+use crate::materials::Material;
+
 /// A validated scene. Built by the scene loader (`scene::load`) or from the gallery
 /// (`scene::builtin`).
 #[derive(Clone, Debug, PartialEq)]
