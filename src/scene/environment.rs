@@ -12,7 +12,7 @@ use super::file::{EnvironmentTable, GradientTable, ScaleValue};
 use super::image;
 use super::report::{Problem, Report};
 use super::suggest::list;
-use super::validate::vector;
+use super::vector::vector;
 use crate::image::Picture;
 use crate::materials::schema::MAX_MAGNITUDE;
 

@@ -5,17 +5,20 @@
 //! channel (linear RGB), and everything is f64: rounding to f32 happens in one later place only.
 
 pub mod builtin;
+pub mod color_map;
 mod describe;
+pub mod direct;
 pub mod environment;
 mod file;
 mod hash;
 mod image;
 pub mod load;
-pub mod material;
 mod measured;
 mod mix;
 pub mod motion;
 mod named;
+mod names;
+mod parsed;
 pub mod particles;
 mod pieces;
 #[cfg(test)]
@@ -24,19 +27,20 @@ mod range;
 mod report;
 mod shape;
 mod suggest;
-pub mod texture;
 mod texture_table;
+pub mod trajectory;
 mod validate;
+mod vector;
 
 pub use describe::summary;
 pub use environment::{Environment, Gradient, Sky};
 pub use file::{MAX_BOUNCES, MAX_SIDE, MAX_SPP, json_schema};
 pub use hash::{content_hash, file_hash};
 pub use load::Loaded;
-pub use material::Material;
-pub use texture::{Texture, TextureImage, Textured};
 
 use glam::DVec3;
+
+use crate::materials::Material;
 
 /// A validated scene. Built by the scene loader (`scene::load`) or from the gallery
 /// (`scene::builtin`).

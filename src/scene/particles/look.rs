@@ -3,7 +3,8 @@
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use super::{Coloring, Map};
+use super::Coloring;
+use crate::scene::color_map::Map;
 
 /// How the file is shown.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -38,7 +39,7 @@ impl Look {
         }
     }
 
-    pub(super) fn coloring(&self) -> Option<Coloring> {
+    pub(in crate::scene) fn coloring(&self) -> Option<Coloring> {
         Some(match self.color_by.as_deref()? {
             "element" => Coloring::Element,
             name => Coloring::Column {
