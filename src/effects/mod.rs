@@ -7,6 +7,7 @@
 //! The table's rows stand where the stages are that bring them, in the order of the data flow: geometry,
 //! samples, materials, light, ends of paths.
 
+mod asked;
 mod geometry;
 mod light;
 mod obstacle;
@@ -14,279 +15,24 @@ mod paths;
 mod role;
 mod samples;
 mod surfaces;
+mod table;
 mod textures;
 
 use std::collections::BTreeSet;
-use std::sync::LazyLock;
 
 use crate::materials::texturable::textured_keys;
-use crate::materials::{Form, Material, flakes, forms, measured, mix};
-use crate::placement::{PlacedSphere, Placement};
+use crate::materials::{Form, flakes, forms, measured, mix};
+use crate::placement::Placement;
 use crate::scene::Scene;
 use crate::settings::Settings;
 
+pub use asked::Asked;
 pub use geometry::{BAKED_LIMIT, BAKED_MOST};
 pub use obstacle::cache_obstacle;
 pub use role::Role;
+pub use table::{Effect, Row, Why, table};
 
-/// An effect: something that a kernel can have or not.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Effect {
-    /// Spheres as constants in the kernel.
-    Baked,
-    /// A loop over spheres in a storage buffer.
-    List,
-    /// A tree over spheres.
-    Bvh,
-    /// Frames at the poles of large spheres.
-    Pole,
-    /// Paths inside spheres.
-    Interior,
-    /// Sides of surfaces that only a sign tells.
-    Straddle,
-    /// Surfaces just within those of dielectrics.
-    Nested,
-    /// Hits as points, moved by a distance.
-    Nudge,
-    /// Hits as points, moved by some ulp.
-    Ulp,
-    /// A thin lens.
-    Lens,
-    /// Spheres that move while the shutter is open.
-    Motion,
-    /// Scrambled Sobol' sequences.
-    Sobol,
-    /// Light by the kind of its path.
-    Classes,
-    /// What is seen first.
-    Features,
-    /// Steps through the tree in the place of light.
-    BvhCost,
-    /// Some tiles only.
-    Adaptive,
-    /// A form of a material, by its code.
-    Form(u32),
-    /// Dielectrics that share points.
-    Priority,
-    /// Light that dielectrics absorb.
-    Absorption,
-    /// Refractive indices by the wavelength.
-    Dispersion,
-    /// Values in the cells of a lattice.
-    TextureChecker,
-    /// Values by a noise.
-    TextureNoise,
-    /// Values by images.
-    TextureImage,
-    /// A key of materials that may be a texture, by its place among all of them, where it is one.
-    Textured(u32),
-    /// Surfaces that emit.
-    Emission,
-    /// A constant environment.
-    Environment,
-    /// An environment of three colours by height.
-    Gradient,
-    /// An image around all.
-    Sky,
-    /// The lecture's estimator.
-    Lecture,
-    /// Light sampling of lamps.
-    Lights,
-    /// Light sampling of an image around all.
-    Skylight,
-    /// Light sampling by projected solid angle.
-    Projected,
-    /// Lights drawn from a table.
-    Table,
-    /// Multiple importance sampling.
-    Mis,
-    /// Russian roulette on the throughput.
-    Roulette,
-    /// Values of cells in the place of paths.
-    RadianceCache,
-}
-
-/// What asks for an effect.
-pub type Why = Box<dyn Fn(&Asked<'_>) -> Vec<String> + Send + Sync>;
-
-/// What the table says of an effect.
-pub struct Row {
-    /// The effect.
-    pub effect: Effect,
-    /// Its name: in the scene file, in the kernel, and in every output.
-    pub name: &'static str,
-    /// What it adds, in a few words.
-    pub what: &'static str,
-    /// The first objects or options that ask for it; empty if nothing does.
-    pub why: Why,
-    /// Of each of these lists one at least is in use where the effect is.
-    pub needs: Vec<Vec<Effect>>,
-    /// None of these is in use where the effect is.
-    pub excludes: Vec<Effect>,
-    /// Names in the kernel that are the effect's own: of functions, types, members, bindings and whatever else
-    /// is declared, or parts of them, as [`is_marked`](Self::is_marked) has it. The kernel has some of them if
-    /// the effect is in use, and else none.
-    pub marks: Vec<String>,
-}
-
-impl Row {
-    fn new(
-        effect: Effect,
-        name: &'static str,
-        what: &'static str,
-        why: impl Fn(&Asked<'_>) -> Vec<String> + Send + Sync + 'static,
-    ) -> Self {
-        Self {
-            effect,
-            name,
-            what,
-            why: Box::new(why),
-            needs: Vec::new(),
-            excludes: Vec::new(),
-            marks: Vec::new(),
-        }
-    }
-
-    fn needs(mut self, any_of: impl Into<Vec<Effect>>) -> Self {
-        self.needs.push(any_of.into());
-        self
-    }
-
-    fn excludes(mut self, effects: impl Into<Vec<Effect>>) -> Self {
-        self.excludes.extend(effects.into());
-        self
-    }
-
-    fn marks<S: Into<String>>(mut self, names: impl IntoIterator<Item = S>) -> Self {
-        self.marks.extend(names.into_iter().map(Into::into));
-        self
-    }
-}
-
-impl Row {
-    /// Whether a name that a kernel declares, with its modules, is one of the effect's own: a mark is the name, a
-    /// type whose member it is, a module that it is in, or a few of these with `::`.
-    #[must_use]
-    pub fn is_marked(&self, name: &str) -> bool {
-        // Names are many and marks are some: nothing is allocated here.
-        let is_part = |mark: &str, at: usize| {
-            let (before, after) = (&name[..at], &name[at + mark.len()..]);
-            (before.is_empty() || before.ends_with("::"))
-                && (after.is_empty() || after.starts_with("::"))
-        };
-        let found = |mark: &String| {
-            let mut places = name.match_indices(mark.as_str());
-            places.any(|(at, _)| is_part(mark, at))
-        };
-        self.marks.iter().any(found)
-    }
-}
-
-/// All effects that the program has, in the order of the data flow.
-pub fn table() -> &'static [Row] {
-    static TABLE: LazyLock<Vec<Row>> = LazyLock::new(|| {
-        let groups = [
-            geometry::rows(),
-            samples::rows(),
-            surfaces::rows(),
-            textures::rows(),
-            light::rows(),
-            paths::rows(),
-        ];
-        groups.into_iter().flatten().collect()
-    });
-    &TABLE
-}
-
-impl Effect {
-    /// Its row of the table.
-    ///
-    /// # Panics
-    /// If the table lacks it.
-    #[must_use]
-    pub fn row(self) -> &'static Row {
-        let row = table().iter().find(|row| row.effect == self);
-        row.unwrap_or_else(|| panic!("{self:?} is not in the table"))
-    }
-
-    /// Its name.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        self.row().name
-    }
-
-    /// The effect of that name.
-    #[must_use]
-    pub fn named(name: &str) -> Option<Self> {
-        let row = table().iter().find(|row| row.name == name);
-        row.map(|row| row.effect)
-    }
-
-    /// That of a form of a material.
-    #[must_use]
-    pub fn of_form(form: &Form) -> Option<Self> {
-        let code = forms().iter().position(|f| *f == form)?;
-        Some(Self::Form(code as u32))
-    }
-}
-
-/// What effects are asked for by.
-pub struct Asked<'a> {
-    /// The scene.
-    pub scene: &'a Scene,
-    /// The same, placed.
-    pub placement: &'a Placement,
-    /// The options.
-    pub settings: &'a Settings,
-}
-
-/// Reasons listed for one effect; the rest is counted.
-const REASONS: usize = 3;
-
-impl Asked<'_> {
-    fn material(&self, sphere: &PlacedSphere) -> &Material {
-        &self.scene.materials[sphere.material]
-    }
-
-    /// The first of the spheres, in scene order, whose materials are `wanted`.
-    fn surfaces(&self, wanted: impl Fn(&Material) -> bool) -> Vec<String> {
-        let mut spheres: Vec<&PlacedSphere> = self.placement.spheres.iter().collect();
-        spheres.retain(|sphere| wanted(self.material(sphere)));
-        spheres.sort_by_key(|s| s.source);
-        self.listed(spheres.into_iter().map(|sphere| (sphere, "")))
-    }
-
-    /// The first of the placed spheres that are `wanted`, with why.
-    fn placed(&self, wanted: impl Fn(&PlacedSphere) -> Option<&'static str>) -> Vec<String> {
-        let spheres = self.placement.spheres.iter();
-        self.listed(spheres.filter_map(|sphere| Some((sphere, wanted(sphere)?))))
-    }
-
-    fn listed<'a>(
-        &self,
-        all: impl Iterator<Item = (&'a PlacedSphere, &'static str)>,
-    ) -> Vec<String> {
-        let mut reasons = Vec::new();
-        let mut more = 0;
-        for (sphere, why) in all {
-            if reasons.len() < REASONS {
-                let name = &self.material(sphere).name;
-                reasons.push(format!("sphere {} ({name}){why}", sphere.source + 1));
-            } else {
-                more += 1;
-            }
-        }
-        if more > 0 {
-            reasons.push(format!("and {more} more"));
-        }
-        reasons
-    }
-}
-
-/// One reason, if there is one.
-fn when(condition: bool, reason: impl FnOnce() -> String) -> Vec<String> {
-    if condition { vec![reason()] } else { vec![] }
-}
+use asked::when;
 
 /// The effects of a kernel, with what asked for each.
 #[derive(Clone, Debug, PartialEq, Eq)]
