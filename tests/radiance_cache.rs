@@ -3,7 +3,7 @@
 //! That the kernel traces the reference's paths is in `agreement`, that any split gives the same bits in `claims`.
 
 use glam::DVec2;
-use gpu_trace::effects::cache_obstacle;
+use gpu_trace::effects::{Effect, cache_obstacle};
 use gpu_trace::film::Film;
 use gpu_trace::gpu::renderer::GpuRenderer;
 use gpu_trace::job::Job;
@@ -426,4 +426,41 @@ fn it_is_off_where_it_would_not_be_right() {
         let why = cache_obstacle(&scene, &placement, &settings);
         assert!(why.is_some_and(|why| why.contains(word)), "{name}: {why:?}");
     }
+}
+
+/// A pilot's loop does not look whether it has been ended, so a path of it that might be is none that it may have.
+#[test]
+fn a_pilots_path_fits_what_drivers_stand() {
+    // Flakes are looked for in 27 cells of a lattice for each part of a mix, and each loop over these.
+    let room = "[camera]\nposition = [0, 0, 3]\nlook_at = [0, 0, 0]\nfov = 40\n[image]\nwidth = 8\nheight = 8\n\
+                [material.wall]\ntype = \"diffuse\"\nalbedo = [0.5, 0.5, 0.5]\n[material.lamp]\ntype = \"diffuse\"\n\
+                albedo = [0, 0, 0]\nemission = [1, 1, 1]\n[[sphere]]\ncenter = [0, -101, 0]\nradius = 100\n\
+                material = \"wall\"\n[[sphere]]\ncenter = [0, 3, 0]\nradius = 1\nmaterial = \"lamp\"\n\
+                [[sphere]]\ncenter = [0, 0, 0]\nradius = 1\nmaterial = \"mix0\"\n";
+    let painted = |parts: usize| {
+        let mut text = room.to_owned();
+        for i in 0..=parts {
+            text += &format!(
+                "[material.paint{i}]\ntype = \"car-paint\"\ndiffuse = [0.1, 0.1, 0.0{}]\n\
+                 specular = [[0.03, 0.03, 0.03], [0.05, 0.05, 0.05], [0, 0, 0]]\nf0 = [0.8, 0.8, 0.8]\nm = [0.4, 0.2, 0.1]\n\
+                 flakes = {{ density = 0.5, scale = 20.0, spread = 0.2, jitter = 0.5, color = [0.1, 0.1, 0.1] }}\n",
+                i + 1
+            );
+        }
+        for i in 0..parts {
+            let rest = if i + 1 < parts { "mix" } else { "paint" };
+            text += &format!(
+                "[material.mix{i}]\ntype = \"mix\"\nmaterials = [\"paint{i}\", \"{rest}{}\"]\nweight = 0.5\n",
+                i + 1
+            );
+        }
+        let scene = scene(&text);
+        job(&scene, &cached(&scene, 8, 8, 16))
+    };
+    let [few, many] = [1, 40].map(painted);
+    assert_eq!(few.cache_obstacle(), None);
+    assert!(few.effects().has(Effect::RadianceCache));
+    let why = many.cache_obstacle().expect("an obstacle");
+    assert!(why.contains("more iterations than drivers allow"), "{why}");
+    assert!(!many.effects().has(Effect::RadianceCache));
 }

@@ -13,6 +13,7 @@ mod light;
 mod obstacle;
 mod paths;
 mod role;
+mod row;
 mod samples;
 mod surfaces;
 mod table;
@@ -30,7 +31,8 @@ pub use asked::Asked;
 pub use geometry::{BAKED_LIMIT, BAKED_MOST};
 pub use obstacle::cache_obstacle;
 pub use role::Role;
-pub use table::{Effect, Row, Why, table};
+pub use row::{Effect, Row, Why};
+pub use table::table;
 
 use asked::when;
 
