@@ -6,6 +6,7 @@
 //! form. What an effect leaves out of the kernel, it computes and finds to be nothing.
 
 pub mod cells;
+mod direct;
 pub mod light;
 pub mod path;
 pub mod scene;

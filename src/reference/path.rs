@@ -1,28 +1,23 @@
 //! Twin of `shaders/path.wesl` and `shaders/path/`: the same paths, one at a time.
 
-use glam::DVec3;
-
-use super::light::aim::aim_at;
-use super::light::environment::{environment_radiance, sky_place};
-use super::light::skylight::{NO_SPHERE, SKY_SHARE, sample_sky, sky_density};
-use super::light::sphere::{LightSample, light_pdf, mis_weight, sample_light};
+use super::light::environment::environment_radiance;
 use super::scene::absorption::transmittance;
 use super::scene::camera::camera_ray;
 use super::scene::priority::{Media, cross_surface, filling, index_within, relative_index};
 use super::scene::ray::{Hit, Ray, Vertex, leave, vertex_at};
-use super::scene::sphere::closest_hit;
 use super::scene::texture::{TexturePoint, emission_at, kind_at};
-use super::state::{Cache, Departure, Path, PathResult};
+use super::state::{Cache, Path, PathResult};
 use crate::film::LightClass;
 use crate::materials::{BsdfSample, Event, MaterialKind, Surface, sample_uniform};
-use crate::placement::{Medium, Placement, SkyTable};
+use crate::placement::{Medium, Placement};
 use crate::sampler::Sampler;
 use crate::sampling::purpose::{CAMERA, TIME, WAVELENGTH, lighting, scattering};
 use crate::sampling::random::{random4, sample_key};
 use crate::sampling::sobol::sobol4;
 use crate::sampling::spectrum::sample_wavelength;
-use crate::scene::{Environment, Scene, Sky};
+use crate::scene::Scene;
 use crate::settings::{Integrator, Settings, stream_words};
+use glam::DVec3;
 
 /// Survival is the largest component of the throughput over 1/4.
 #[must_use]
@@ -197,7 +192,7 @@ impl PathTracer<'_> {
     }
 
     /// Where on its sphere a vertex is.
-    fn point_at(&self, hit: &Hit, vertex: &Vertex) -> TexturePoint {
+    pub(super) fn point_at(&self, hit: &Hit, vertex: &Vertex) -> TexturePoint {
         let sphere = &self.placement.spheres[hit.index];
         let scale = self.placement.scale;
         TexturePoint {
@@ -211,7 +206,7 @@ impl PathTracer<'_> {
     }
 
     /// What is left of light after a length `t` in what fills the space, `None` for infinitely far.
-    fn transmittance(&self, media: &Media, t: Option<f64>) -> DVec3 {
+    pub(super) fn transmittance(&self, media: &Media, t: Option<f64>) -> DVec3 {
         let Some(medium) = filling(media) else {
             return DVec3::ONE;
         };
@@ -303,220 +298,12 @@ impl PathTracer<'_> {
     }
 
     /// Changes the media of a ray that has crossed the surface.
-    fn cross(&self, ray: &mut Ray, hit: &Hit, wavelength: Option<f64>) {
+    pub(super) fn cross(&self, ray: &mut Ray, hit: &Hit, wavelength: Option<f64>) {
         let medium = Medium {
             level: self.placement.spheres[hit.index].level,
             ior: index_at(self.kind_of(hit.index), wavelength),
             sphere: hit.index,
         };
         cross_surface(&mut ray.media, medium, hit.inside);
-    }
-}
-
-impl PathTracer<'_> {
-    /// Whether vertices look for light.
-    fn looks_for_light(&self) -> bool {
-        matches!(self.settings.integrator, Integrator::Path | Integrator::Nee)
-    }
-
-    /// Whether they look for lamps.
-    fn samples_lamps(&self) -> bool {
-        self.looks_for_light() && !self.placement.lights.table.is_empty()
-    }
-
-    /// The image that they look for.
-    fn sky(&self) -> Option<(&Sky, &SkyTable)> {
-        let environment = self.scene.environment.as_ref();
-        let sky = environment.and_then(Environment::sky)?;
-        let looks = self.looks_for_light() && !self.placement.enclosed;
-        looks.then(|| (sky, self.placement.sky_table(sky)))
-    }
-
-    /// The share of what a ray meets with the pdf `bsdf_pdf` that the path counts, where light sampling finds it with
-    /// the other one.
-    fn share_of_hit(&self, bsdf_pdf: f64, light_pdf: f64) -> f64 {
-        match self.settings.integrator {
-            Integrator::Path => mis_weight(bsdf_pdf, light_pdf),
-            _ if light_pdf > 0.0 => 0.0,
-            _ => 1.0,
-        }
-    }
-
-    /// The share of what is seen of the environment that the path counts.
-    fn share_of_sky(&self, w: DVec3, from: Departure) -> f64 {
-        match self.sky().filter(|_| from.pdf > 0.0) {
-            None => 1.0,
-            Some((sky, table)) => {
-                let share = if self.samples_lamps() { SKY_SHARE } else { 1.0 };
-                let other = share * sky_density(sky, table, sky_place(sky, w));
-                self.share_of_hit(from.pdf, other)
-            }
-        }
-    }
-
-    /// The share of a hit's emission that the path counts: light sampling where it came from has the rest.
-    fn share_of_emission(&self, ray: &Ray, hit: &Hit, from: Departure) -> f64 {
-        let lights = &self.placement.lights;
-        let light = lights.of_sphere(hit.index);
-        let rivals = self.samples_lamps() && from.pdf > 0.0 && !hit.inside;
-        let Some(light) = light.filter(|_| rivals) else {
-            return 1.0;
-        };
-        let sphere = &self.placement.spheres[hit.index];
-        let aim = aim_at(sphere, ray.anchor, ray.offset, ray.motion, ray.time);
-        let pdf_per_weight =
-            (!lights.from_table(self.settings.light_sampling)).then_some(from.pdf_per_weight);
-        let share = self.sky().map_or(1.0, |_| 1.0 - SKY_SHARE);
-        self.share_of_hit(from.pdf, share * light_pdf(light, &aim, pdf_per_weight))
-    }
-
-    /// A direction to a lamp or to the image.
-    fn sample_direction(&self, vertex: &Vertex, own: usize, u: [f64; 4]) -> Option<LightSample> {
-        let sampling = self.settings.light_sampling;
-        let lamp = |u| sample_light(self.placement, sampling, vertex, own, u);
-        let Some((sky, table)) = self.sky() else {
-            return lamp(u);
-        };
-        if !self.samples_lamps() {
-            return Some(sample_sky(sky, table, u));
-        }
-        let to_sky = u[2] < SKY_SHARE;
-        let (low, share) = if to_sky {
-            (0.0, SKY_SHARE)
-        } else {
-            (SKY_SHARE, 1.0 - SKY_SHARE)
-        };
-        let v = [u[0], u[1], (u[2] - low) / share, u[3]];
-        let lamp = lamp(v);
-        let pdf_per_weight = lamp.map_or(0.0, |s| s.pdf_per_weight);
-        let chosen = if to_sky {
-            Some(sample_sky(sky, table, v))
-        } else {
-            lamp
-        };
-        chosen.map(|s| LightSample {
-            pdf: share * s.pdf,
-            mis_pdf: share * s.mis_pdf,
-            pdf_per_weight,
-            ..s
-        })
-    }
-
-    /// What one lamp, chosen at random, or the image sends over a vertex into the path.
-    fn direct_light(
-        &self,
-        path: &Path,
-        hit: &Hit,
-        vertex: &Vertex,
-        (kind, surface): (&MaterialKind, &Surface),
-        u: [f64; 4],
-    ) -> Direct {
-        let mut direct = Direct::default();
-        let ray = &path.ray;
-        let spheres = &self.placement.spheres;
-        if kind.is_delta() {
-            return direct;
-        }
-        let Some(s) = self.sample_direction(vertex, hit.index, u) else {
-            return direct;
-        };
-        direct.pdf_per_weight = s.pdf_per_weight;
-        let f = kind.evaluate(surface, -ray.direction, s.wi);
-        direct.event = Some(f.event);
-        if s.pdf <= 0.0 || f.pdf <= 0.0 {
-            return direct;
-        }
-        let crossed = f.event.is(Event::TRANSMITTED);
-        let offset = self.placement.offset;
-        let mut shadow = leave(ray.clone(), hit, vertex, s.wi, crossed, offset);
-        if crossed {
-            self.cross(&mut shadow, hit, path.wavelength);
-        }
-        // A ray that misses the limb by a rounding has seen the lamp all the same; lamps are sampled
-        // from outside.
-        let first = closest_hit(&shadow, spheres);
-        let hidden = first.is_some_and(|first| {
-            if first.index == s.sphere {
-                first.inside
-            } else {
-                first.t < s.limb
-            }
-        });
-        direct.rays = 1;
-        if hidden {
-            return direct;
-        }
-        let share = match self.settings.integrator {
-            Integrator::Path => mis_weight(s.mis_pdf, f.pdf),
-            _ => 1.0,
-        };
-        let radiance = if s.sphere == NO_SPHERE {
-            environment_radiance(self.scene, s.wi)
-        } else {
-            // Where f32 or a rounding lets the ray miss the limb, it is there.
-            let met = Hit {
-                t: first
-                    .filter(|first| first.index == s.sphere)
-                    .map_or(s.limb, |first| first.t),
-                index: s.sphere,
-                inside: false,
-            };
-            let vertex = vertex_at(&shadow, &met, &spheres[s.sphere]);
-            let lamp = &self.scene.materials[spheres[s.sphere].material];
-            emission_at(lamp, &self.point_at(&met, &vertex))
-        };
-        direct.radiance = share / s.pdf * f.f_cos * radiance;
-        let length = match first.filter(|first| first.index == s.sphere) {
-            Some(first) => Some(first.t),
-            None => Some(s.limb).filter(|limb| limb.is_finite()),
-        };
-        direct.radiance *= self.transmittance(&shadow.media, length);
-        direct
-    }
-}
-
-/// What light sampling found at a vertex.
-#[derive(Clone, Copy, Debug, Default)]
-struct Direct {
-    radiance: DVec3,
-    rays: u32,
-    pdf_per_weight: f64,
-    event: Option<Event>,
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::scene::load::load_str;
-
-    #[test]
-    fn a_lamp_that_is_hit_from_within_keeps_its_emission() {
-        let text = "[camera]\nposition = [0, 0, 4]\nlook_at = [0, 0, 0]\nfov = 40.0\n[image]\nwidth = 8\n\
-                    height = 8\n[material.lamp]\ntype = \"dielectric\"\nior = 1.5\nemission = [1, 1, 1]\n\
-                    [[sphere]]\ncenter = [0, 0, 0]\nradius = 1\nmaterial = \"lamp\"\n";
-        let scene = load_str("test", text).expect("a scene").scene;
-        let settings = Settings::for_scene(&scene);
-        let placement = Placement::new(&scene, 8, 8);
-        let tracer = PathTracer::new(&scene, &placement, &settings);
-        // From a point within that a rounding has put outside.
-        let mut ray = camera_ray(&placement.camera, [0, 0], [0.5; 4], &placement.within);
-        let sphere = &placement.spheres[0];
-        ray.anchor = sphere.anchor;
-        ray.offset = (1.0 + 1.0e-9) * sphere.radius * DVec3::X;
-        let share = |inside| {
-            let hit = Hit {
-                t: 1.0,
-                index: 0,
-                inside,
-            };
-            let from = Departure {
-                pdf: 0.3,
-                pdf_per_weight: 0.3,
-            };
-            tracer.share_of_emission(&ray, &hit, from)
-        };
-        assert_eq!(share(true), 1.0);
-        // From outside light sampling has a part.
-        assert!(share(false) < 0.9);
     }
 }

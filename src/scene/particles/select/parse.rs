@@ -1,17 +1,8 @@
-//! `select`: which particles are kept, as an expression on their columns and elements.
-//!
-//!     any      = all { "or" all }
-//!     all      = one { "and" one }
-//!     one      = "not" one | "(" any ")" | "element" ("==" | "!=") SYMBOL | sum compare sum [ compare sum ]
-//!     compare  = "<" | "<=" | ">" | ">=" | "==" | "!="
-//!     sum      = product { ("+" | "-") product }
-//!     product  = value { ("*" | "/") value }
-//!     value    = NUMBER | COLUMN | "-" value | "(" sum ")"
-//!
-//! So `0 < x < 10 and element != H` is a slab without hydrogen, `x + 2*z <= 4` a half-space.
+//! Expressions as they are written.
 
 use std::ops::Range;
 
+use super::condition::{Compare, Condition, Number};
 use crate::particles::{Element, Particles};
 
 /// Expressions within each other, at most: a bound for the stack.
@@ -19,137 +10,26 @@ const DEEPEST: usize = 64;
 
 /// What is wrong with an expression: where in its text, and what.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Mistake {
+pub(in super::super) struct Mistake {
     /// Bytes of the expression's text.
-    pub(super) span: Range<usize>,
+    pub(in super::super) span: Range<usize>,
     /// What is wrong.
-    pub(super) message: String,
+    pub(in super::super) message: String,
 }
 
-/// An expression whose names are columns of certain particles.
-#[derive(Debug)]
-pub(super) struct Selection(Condition);
-
-#[derive(Debug)]
-enum Condition {
-    Any(Vec<Condition>),
-    All(Vec<Condition>),
-    Not(Box<Condition>),
-    /// Whether the element is this one.
-    Is(Element),
-    /// Sums, each of which compares with the next.
-    Chain(Number, Vec<(Compare, Number)>),
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Compare {
-    Less,
-    AtMost,
-    Greater,
-    AtLeast,
-    Equal,
-    Different,
-}
-
-#[derive(Debug)]
-enum Number {
-    Value(f64),
-    Column(usize),
-    Minus(Box<Number>),
-    Binary(char, Box<Number>, Box<Number>),
-}
-
-impl Selection {
-    /// The expression `text` on the columns of `particles`.
-    pub(super) fn parse(text: &str, particles: &Particles) -> Result<Self, Mistake> {
-        let mut parser = Parser {
-            tokens: tokens(text)?,
-            next: 0,
-            end: text.len(),
-            particles,
-            depth: 0,
-        };
-        let condition = parser.any()?;
-        match parser.peek() {
-            None => Ok(Self(condition)),
-            Some(_) => Err(parser.expected("`and`, `or` or the end")),
-        }
-    }
-
-    /// Whether particle `index` is kept.
-    pub(super) fn keeps(&self, particles: &Particles, index: usize) -> bool {
-        self.0.holds(particles, index)
-    }
-}
-
-impl Condition {
-    fn holds(&self, particles: &Particles, index: usize) -> bool {
-        match self {
-            Self::Any(all) => all.iter().any(|c| c.holds(particles, index)),
-            Self::All(all) => all.iter().all(|c| c.holds(particles, index)),
-            Self::Not(inner) => !inner.holds(particles, index),
-            Self::Is(element) => particles
-                .elements
-                .as_ref()
-                .is_some_and(|elements| elements[index] == Some(*element)),
-            Self::Chain(first, rest) => {
-                let mut left = first.value(particles, index);
-                rest.iter().all(|(compare, number)| {
-                    let right = number.value(particles, index);
-                    let holds = compare.holds(left, right);
-                    left = right;
-                    holds
-                })
-            }
-        }
-    }
-}
-
-impl Compare {
-    fn of(token: &str) -> Option<Self> {
-        Some(match token {
-            "<" => Self::Less,
-            "<=" => Self::AtMost,
-            ">" => Self::Greater,
-            ">=" => Self::AtLeast,
-            "==" => Self::Equal,
-            "!=" => Self::Different,
-            _ => return None,
-        })
-    }
-
-    #[expect(
-        clippy::float_cmp,
-        reason = "numbers of a file are compared as they stand there"
-    )]
-    fn holds(self, a: f64, b: f64) -> bool {
-        match self {
-            Self::Less => a < b,
-            Self::AtMost => a <= b,
-            Self::Greater => a > b,
-            Self::AtLeast => a >= b,
-            Self::Equal => a == b,
-            Self::Different => a != b,
-        }
-    }
-}
-
-impl Number {
-    fn value(&self, particles: &Particles, index: usize) -> f64 {
-        match self {
-            Self::Value(value) => *value,
-            Self::Column(column) => particles.columns[*column].values[index],
-            Self::Minus(inner) => -inner.value(particles, index),
-            Self::Binary(operator, a, b) => {
-                let (a, b) = (a.value(particles, index), b.value(particles, index));
-                match operator {
-                    '+' => a + b,
-                    '-' => a - b,
-                    '*' => a * b,
-                    _ => a / b,
-                }
-            }
-        }
+/// The expression `text` on the columns of `particles`.
+pub(super) fn condition_of(text: &str, particles: &Particles) -> Result<Condition, Mistake> {
+    let mut parser = Parser {
+        tokens: tokens(text)?,
+        next: 0,
+        end: text.len(),
+        particles,
+        depth: 0,
+    };
+    let condition = parser.any()?;
+    match parser.peek() {
+        None => Ok(condition),
+        Some(_) => Err(parser.expected("`and`, `or` or the end")),
     }
 }
 
@@ -390,89 +270,5 @@ impl<'t> Parser<'t> {
                 let names: Vec<_> = columns.iter().map(|c| c.name.as_str()).collect();
                 self.expected(&format!("a number or a column: {}", names.join(", ")))
             })
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use glam::DVec3;
-
-    use super::Selection;
-    use crate::particles::{Column, Element, Particles};
-
-    fn particles() -> Particles {
-        let column = |name: &str, values: [f64; 3]| Column {
-            name: name.into(),
-            values: values.into(),
-        };
-        Particles {
-            positions: vec![DVec3::ZERO; 3],
-            elements: Some(["C", "H", "Xx"].map(Element::of_symbol).to_vec()),
-            columns: vec![
-                column("x", [0.0, 1.0, 2.0]),
-                column("c_pe[1]", [-3.0, 0.0, 3.0]),
-            ],
-        }
-    }
-
-    fn kept(text: &str) -> Vec<usize> {
-        let particles = particles();
-        let selection = Selection::parse(text, &particles).expect(text);
-        (0..3).filter(|i| selection.keeps(&particles, *i)).collect()
-    }
-
-    #[test]
-    fn expressions_mean_what_they_say() {
-        let cases: [(&str, &[usize]); 16] = [
-            ("x < 1", &[0]),
-            ("x <= 1", &[0, 1]),
-            ("0 < x < 2", &[1]),
-            ("x == 0 or x == 2", &[0, 2]),
-            ("not x == 0 and x != 2", &[1]),
-            ("not (x == 0 or x == 2)", &[1]),
-            ("element == C", &[0]),
-            ("element != 'H'", &[0, 2]),
-            ("(x + 1) * 2 > 3", &[1, 2]),
-            ("x + 1 * 2 > 3", &[2]),
-            ("-x - -1 > 0", &[0]),
-            ("c_pe[1]/3 <= -1e0", &[0]),
-            ("\"c_pe[1]\" > 1.5e-3", &[2]),
-            ("((x) < (1))", &[0]),
-            ("4-2-1 == x", &[1]),
-            ("8/4/2 == x", &[1]),
-        ];
-        for (text, wanted) in cases {
-            assert_eq!(kept(text), wanted, "{text}");
-        }
-    }
-
-    #[test]
-    fn mistakes_are_at_their_place() {
-        let particles = particles();
-        for (text, start, says) in [
-            ("", 0, "a number or a column"),
-            ("x", 1, "a comparison"),
-            ("x <", 3, "a number or a column: x, c_pe[1]"),
-            ("y < 1", 0, "a column"),
-            ("x < 1 x", 6, "the end"),
-            ("element < C", 8, "`=="),
-            ("element == Q", 11, "symbol"),
-            ("x < (1", 6, "`)`"),
-            ("x < 1 ; 2", 6, "means nothing"),
-            ("x < 'y", 4, "without its end"),
-            ("0 < x < 1 < 2", 10, "the end"),
-        ] {
-            let mistake = Selection::parse(text, &particles).expect_err(text);
-            assert_eq!(mistake.span.start, start, "{text}: {}", mistake.message);
-            assert!(
-                mistake.message.contains(says),
-                "{text}: {}",
-                mistake.message
-            );
-        }
-        let deep = "(".repeat(100_000);
-        assert!(Selection::parse(&deep, &particles).is_err());
-        let long = format!("0{} < 1", "+x".repeat(100_000));
-        assert!(Selection::parse(&long, &particles).is_err());
     }
 }
