@@ -2,7 +2,8 @@
 //! leak out of a closed one. The comparison of `docs/numerics.md`.
 
 use super::context::Context;
-use super::intersection::{NO_HIT, bounce, bounce_rows, leaving, normal_at_hit};
+use super::intersection::NO_HIT;
+use super::leaving::{bounce, bounce_rows, leaving, normal_at_hit};
 use crate::error::Result;
 use crate::verify::{Random, Row, vector};
 

@@ -13,6 +13,7 @@ mod film;
 mod furnaces;
 mod integrator;
 mod intersection;
+mod leaving;
 mod lights;
 mod materials;
 mod motion;
@@ -59,8 +60,9 @@ pub struct Case {
 /// All cases, by number.
 #[must_use]
 pub fn cases() -> Vec<Case> {
-    let groups: [&[Case]; 14] = [
+    let groups: [&[Case]; 15] = [
         intersection::CASES,
+        leaving::CASES,
         placing::CASES,
         lights::CASES,
         materials::CASES,

@@ -4,7 +4,8 @@ use glam::DVec3;
 
 use super::Case;
 use super::context::Context;
-use super::intersection::{NO_HIT, bounce_rows, leaving, normal_at_hit, ray, ulp};
+use super::intersection::{NO_HIT, ray, ulp};
+use super::leaving::{bounce_rows, leaving, normal_at_hit};
 use crate::bvh::{Options, Tree};
 use crate::effects::Effects;
 use crate::error::Result;
