@@ -12,7 +12,6 @@ use crate::film::PILOT_SAMPLES;
 use crate::placement::media::MAX_LEVELS;
 use crate::placement::{Placement, Side};
 use crate::reference::survey::survey;
-use crate::scene::motion::Fault;
 use crate::scene::{MAX_BOUNCES, MAX_SIDE, MAX_SPP, Scene};
 use crate::settings::{GeometryChoice, Integrator, Offset, Settings, TERMINATIONS, View};
 use crate::variance::{VarianceReport, variance_class};
@@ -32,13 +31,13 @@ pub struct Job {
 ///
 /// # Errors
 /// [`Error::Usage`] where settings are out of range or contradict each other or the scene;
-/// [`Error::Placement`] for a scene that the kernel cannot render in this way.
+/// [`Error::Placement`] for a scene that no scene file could hold, or that the kernel cannot render in this way.
 pub fn prepare(scene: &Scene, settings: &Settings) -> Result<Job> {
+    scene.check()?;
     check_image(settings)?;
     check_samples(settings)?;
     check_transport(settings)?;
     check_geometry(scene, settings)?;
-    check_motion(scene)?;
     let placement = Placement::with_offset(scene, settings.width, settings.height, settings.offset);
     check_levels(&placement)?;
     check_magnitudes(scene, &placement)?;
@@ -218,16 +217,6 @@ fn check_geometry(scene: &Scene, settings: &Settings) -> Result<()> {
         ));
     }
     Ok(())
-}
-
-/// Refuses spheres that move as they cannot; a scene file is refused before, with their lines.
-fn check_motion(scene: &Scene) -> Result<()> {
-    let faults = (1..).zip(&scene.spheres);
-    let mut faults = faults.filter_map(|(i, sphere)| Some((i, Fault::of(scene, sphere)?)));
-    faults.next().map_or(Ok(()), |(i, fault)| {
-        let (what, help) = (fault.what(), fault.help());
-        Err(Error::Placement(format!("sphere {i} {what}: {help}")))
-    })
 }
 
 /// Refuses views of what is not in the kernel.

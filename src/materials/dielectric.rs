@@ -171,7 +171,7 @@ impl Bsdf for Dielectric {
     // What is not given does not count: scenes of before keep their hash.
     fn parameters(&self) -> Vec<(&'static str, Value)> {
         let mut parameters = vec![self.index().parameter()];
-        if self.roughness > 0.0 {
+        if self.roughness != 0.0 {
             parameters.push(("roughness", Value::Number(self.roughness)));
         }
         if self.absorption != DVec3::ZERO {

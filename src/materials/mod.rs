@@ -119,6 +119,11 @@ pub trait Bsdf {
         None
     }
 
+    /// What has to be put to it beside its parameters, by who makes a scene of it, and is not there or not right.
+    fn lacking(&self) -> Option<&'static str> {
+        None
+    }
+
     /// What is legal and probably not meant: what it does, and what to change.
     fn warning(&self) -> Option<[String; 2]> {
         None

@@ -108,6 +108,11 @@ fn change(
                 let albedo = kind.color().clamp(DVec3::ZERO, DVec3::ONE);
                 is_it.then(|| Diffuse { albedo }.into())
             });
+            // What is no dielectric any more fills no overlap.
+            for sphere in &mut scene.spheres {
+                let transmits = scene.materials[sphere.material].kind.transmits();
+                sphere.priority = sphere.priority.filter(|_| transmits);
+            }
             "diffuse of its colour"
         }
         Effect::Absorption => {

@@ -8,13 +8,13 @@ use std::sync::Arc;
 use glam::DVec3;
 use toml::Spanned;
 
+use super::check::sky_limit;
 use super::file::{EnvironmentTable, GradientTable, ScaleValue};
 use super::image;
 use super::report::{Problem, Report};
 use super::suggest::list;
 use super::validate::vector;
 use crate::image::Picture;
-use crate::materials::schema::MAX_MAGNITUDE;
 
 /// Light from everywhere.
 #[derive(Clone, Debug, PartialEq)]
@@ -46,6 +46,7 @@ pub struct Sky {
     scale: DVec3,
     rotation: f64,
     brightest: f64,
+    is_sound: bool,
 }
 
 impl Sky {
@@ -57,13 +58,27 @@ impl Sky {
             .pixels
             .iter()
             .fold(DVec3::ZERO, |most, texel| most.max(radiance(texel)));
+        let is_radiance = |x: &f32| x.is_finite() && *x >= 0.0;
         Self {
             name: name.to_owned(),
+            is_sound: image.pixels.as_flattened().iter().all(is_radiance),
             image: Arc::new(image),
             scale,
             rotation: rotation.rem_euclid(360.0),
             brightest: (most * scale).max_element(),
         }
+    }
+
+    /// Whether all texels are finite and none is negative.
+    #[must_use]
+    pub fn is_sound(&self) -> bool {
+        self.is_sound
+    }
+
+    /// The largest radiance of any channel.
+    #[must_use]
+    pub fn brightest(&self) -> f64 {
+        self.brightest
     }
 
     /// What messages call it: its file, as the scene names it.
@@ -258,11 +273,7 @@ fn sky(
     };
     files.push(path);
     let sky = Sky::new(image.get_ref(), texels, scale, rotation);
-    if sky.brightest > MAX_MAGNITUDE {
-        let text = format!(
-            "its brightest value times `scale` is {:e}, more than {MAX_MAGNITUDE:e}, the limit of a radiance",
-            sky.brightest
-        );
+    if let Err(text) = sky_limit(&sky) {
         wrong(text, Some("a smaller `scale` brings it below"));
         return None;
     }
