@@ -182,6 +182,9 @@ fn check_samples(settings: &Settings) -> Result<()> {
     if settings.error.is_some_and(|e| !(e.is_finite() && e > 0.0)) {
         return usage("--error: an error to reach is above 0".into());
     }
+    if settings.time.is_some_and(|time| time.is_zero()) {
+        return usage("--time: no time at all".into());
+    }
     Ok(())
 }
 
@@ -198,6 +201,18 @@ fn check_transport(settings: &Settings) -> Result<()> {
         return usage(format!(
             "--termination {termination}: a probability from 0 to below 1"
         ));
+    }
+    let integrator = settings.integrator;
+    if settings.light_sampling.is_some() && !integrator.samples_lights() {
+        return usage(format!(
+            "--light-sampling says how path and nee sample lights: --integrator {} does not",
+            integrator.name()
+        ));
+    }
+    if settings.roulette.is_some() && integrator.is_lecture() {
+        return usage(
+            "--integrator lecture has its own roulette: --termination 0 turns it off".into(),
+        );
     }
     if !settings.offset.is_valid() {
         return usage(format!(

@@ -154,7 +154,7 @@ fn other_kernels_agree_with_the_reference() {
         };
         let list = Settings {
             geometry: GeometryChoice::List,
-            roulette: false,
+            roulette: Some(false),
             max_bounces: 12,
             ..base
         };

@@ -18,7 +18,6 @@ const INTEGRATORS: [Integrator; 4] = [
 fn with_aovs(scene: &Scene, integrator: Integrator, spp: u64) -> Settings {
     Settings {
         integrator,
-        roulette: !matches!(integrator, Integrator::Lecture { .. }),
         classes: true,
         features: true,
         ..settings(scene, 24, 18, spp)

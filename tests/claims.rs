@@ -41,14 +41,14 @@ fn gray() -> Scene {
 fn estimators(scene: &Scene) -> Vec<Settings> {
     let mut all = Vec::new();
     for integrator in Integrator::ALL {
-        let asks = matches!(integrator, Integrator::Path | Integrator::Nee);
+        let asks = integrator.samples_lights();
         let kinds = &LightSampling::ALL[..if asks { 2 } else { 1 }];
         for light_sampling in kinds {
             for sampler in Sampler::ALL {
                 for adaptive in [false, true] {
                     all.push(Settings {
                         integrator: *integrator,
-                        light_sampling: *light_sampling,
+                        light_sampling: asks.then_some(*light_sampling),
                         sampler: *sampler,
                         adaptive,
                         ..settings(scene, 32, 24, SPP)
@@ -69,7 +69,7 @@ fn name(s: &Settings) -> String {
     format!(
         "{} {} {}{}{}",
         s.integrator.name(),
-        s.light_sampling.name(),
+        s.light_sampling().name(),
         s.sampler.name(),
         if s.adaptive { " adaptive" } else { "" },
         if s.radiance_cache { " cache" } else { "" },
@@ -209,7 +209,7 @@ fn every_estimator_holds_what_it_claims() {
     let plain = Settings {
         integrator: Integrator::Bsdf,
         sampler: Sampler::Independent,
-        roulette: false,
+        roulette: Some(false),
         seed: 99,
         ..settings(&scene, 32, 24, 8 * SPP)
     };

@@ -309,11 +309,9 @@ fn asking_for(set: &Set) -> (Scene, Settings) {
             [.., true] => Integrator::Nee,
             _ => Integrator::Bsdf,
         },
-        light_sampling: match has(Effect::Lights) && !has(Effect::Projected) {
-            true => LightSampling::Cone,
-            false => LightSampling::Projected,
-        },
-        roulette: has(Effect::Roulette),
+        light_sampling: (has(Effect::Lights) && !has(Effect::Projected))
+            .then_some(LightSampling::Cone),
+        roulette: (!has(Effect::Lecture)).then_some(has(Effect::Roulette)),
         radiance_cache: has(Effect::RadianceCache),
         adaptive: has(Effect::Adaptive),
         classes: has(Effect::Classes),
@@ -592,7 +590,7 @@ fn every_set_in_the_scenes() {
             match variant {
                 1 => settings.geometry = GeometryChoice::List,
                 2 => settings.integrator = Integrator::Lecture { termination: 0.2 },
-                3 => settings.roulette = false,
+                3 => settings.roulette = Some(false),
                 4 => settings.geometry = GeometryChoice::Bvh,
                 _ => {}
             }

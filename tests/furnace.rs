@@ -40,7 +40,7 @@ const RADII: [f64; 7] = [1.0e-6, 1.0e-3, 0.1, 1.0, 7.0, 1.0e3, 1.0e6];
 fn check_closed(albedo: f64, radius: f64, bounces: u32) {
     let scene = closed(albedo, radius);
     let settings = Settings {
-        roulette: false,
+        roulette: Some(false),
         max_bounces: bounces,
         ..settings(&scene, 16, 16, 16)
     };
@@ -167,7 +167,7 @@ fn companion_a_wrong_furnace_is_found() {
     let run = |albedo: f64, bounces: u32| {
         let scene = closed(albedo, 1.0);
         let settings = Settings {
-            roulette: false,
+            roulette: Some(false),
             max_bounces: bounces,
             ..settings(&scene, 16, 16, 16)
         };

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 use std::sync::Arc;
+use std::time::Duration;
 
 use glam::DVec3;
 
@@ -13,10 +14,12 @@ use gpu_trace::materials::MaterialKind;
 use gpu_trace::materials::measured::{BrdfTable, Measured};
 use gpu_trace::materials::texturable::texturable_key;
 use gpu_trace::scene::{Environment, Gradient, Material, Scene, Sky, Texture, TextureImage};
-use gpu_trace::settings::{GeometryChoice, Integrator, Offset, Rect, Settings};
+use gpu_trace::settings::{GeometryChoice, Integrator, LightSampling, Offset, Rect, Settings};
 use gpu_trace::verify::settings;
 
 type Change = fn(&mut Settings);
+
+const LECTURE: Integrator = Integrator::Lecture { termination: 0.2 };
 
 fn lamps() -> Scene {
     scene_file("scenes/lecture.toml")
@@ -73,6 +76,26 @@ fn settings_out_of_range_are_refused_and_their_neighbours_are_not() {
             |s| s.error = Some(1.0e-9),
         ),
         (|s| s.error = Some(f64::NAN), "--error", |s| s.error = None),
+        (
+            |s| s.time = Some(Duration::ZERO),
+            "--time: no time at all",
+            |s| s.time = Some(Duration::from_nanos(1)),
+        ),
+        (
+            |s| (s.integrator, s.light_sampling) = (Integrator::Bsdf, Some(LightSampling::Cone)),
+            "--light-sampling says how path and nee sample lights: --integrator bsdf does not",
+            |s| (s.integrator, s.light_sampling) = (Integrator::Nee, Some(LightSampling::Cone)),
+        ),
+        (
+            |s| (s.integrator, s.light_sampling) = (LECTURE, Some(LightSampling::Projected)),
+            "--integrator lecture does not",
+            |s| s.integrator = LECTURE,
+        ),
+        (
+            |s| (s.integrator, s.roulette) = (LECTURE, Some(true)),
+            "--integrator lecture has its own roulette",
+            |s| (s.integrator, s.roulette) = (Integrator::Bsdf, Some(false)),
+        ),
         (
             |s| s.max_bounces = 65_536,
             "--max-bounces 65536",

@@ -179,7 +179,7 @@ fn sampled(
 ) -> Film {
     let settings = Settings {
         integrator,
-        light_sampling,
+        light_sampling: Some(light_sampling),
         ..settings(scene, 24, 18, spp)
     };
     render_gpu(scene, &settings)
@@ -322,7 +322,7 @@ fn both_backends_sample_the_same_lights() {
         for (integrator, light_sampling) in SAMPLED {
             let settings = Settings {
                 integrator,
-                light_sampling,
+                light_sampling: Some(light_sampling),
                 ..settings(&scene, 24, 18, 64)
             };
             let (a, b) = (render_gpu(&scene, &settings), render_cpu(&scene, &settings));

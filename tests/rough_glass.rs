@@ -123,20 +123,18 @@ fn lamps_are_found_on_both_sides() {
             mean(&render_gpu(&scene, &settings))
         };
         // Without light sampling: what it must not change.
-        let [truth, error] = with(Integrator::Bsdf, LightSampling::Projected, 16);
+        let [truth, error] = with(Integrator::Bsdf, None, 16);
         for (integrator, light_sampling) in [
-            (Integrator::Path, LightSampling::Projected),
-            (Integrator::Path, LightSampling::Cone),
-            (Integrator::Nee, LightSampling::Projected),
-            (
-                Integrator::Lecture { termination: 0.2 },
-                LightSampling::Projected,
-            ),
+            (Integrator::Path, None),
+            (Integrator::Path, Some(LightSampling::Cone)),
+            (Integrator::Nee, None),
+            (Integrator::Lecture { termination: 0.2 }, None),
         ] {
             let [found, own] = with(integrator, light_sampling, 4);
             let both = error.hypot(own);
             let z = (found - truth) / both;
-            let name = format!("{name}, {} {}", integrator.name(), light_sampling.name());
+            let sampling: LightSampling = light_sampling.unwrap_or_default();
+            let name = format!("{name}, {} {}", integrator.name(), sampling.name());
             eprintln!(
                 "{name}: {found:.5}, z = {z:.2}, error {:.3} %",
                 100.0 * both / truth

@@ -451,9 +451,9 @@ impl RenderArgs {
             seed: self.seed,
             max_bounces: self.max_bounces.unwrap_or(settings.max_bounces),
             integrator: integrator.with_termination(termination),
-            light_sampling: self.light_sampling.unwrap_or_default(),
+            light_sampling: self.light_sampling,
             radiance_cache: self.radiance_cache == Some(Caching::On),
-            roulette: !integrator.is_lecture() && self.roulette != Some(false),
+            roulette: self.roulette,
             sampler: self.sampler,
             geometry: self.geometry,
             view: self.view,
@@ -474,18 +474,6 @@ impl RenderArgs {
         if self.termination.is_some() && !lecture {
             return Err(Error::Usage(
                 "--termination is the lecture's: add --integrator lecture".into(),
-            ));
-        }
-        let blind = named.filter(|i| i.is_lecture() || *i == Integrator::Bsdf);
-        if let Some(blind) = blind.filter(|_| self.light_sampling.is_some()) {
-            return Err(Error::Usage(format!(
-                "--light-sampling says how path and nee sample lights: --integrator {} does not",
-                blind.name()
-            )));
-        }
-        if self.roulette.is_some() && lecture {
-            return Err(Error::Usage(
-                "--integrator lecture has its own roulette: --termination 0 turns it off".into(),
             ));
         }
         if self.backend == Wanted::Only(BackendKind::Cpu) && self.device.is_some() {

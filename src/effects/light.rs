@@ -111,7 +111,7 @@ pub(super) fn rows() -> Vec<Row> {
             "projected",
             "light sampling by projected solid angle",
             |asked| {
-                let projected = asked.settings.light_sampling == LightSampling::Projected;
+                let projected = asked.settings.light_sampling() == LightSampling::Projected;
                 when(samples_lights(asked) && projected, || {
                     "light sampling projected".into()
                 })
@@ -125,7 +125,7 @@ pub(super) fn rows() -> Vec<Row> {
             "lights drawn from a table by power, whatever the vertex",
             |asked| {
                 let lights = &asked.placement.lights;
-                let sampling = asked.settings.light_sampling;
+                let sampling = asked.settings.light_sampling();
                 when(
                     samples_lights(asked) && lights.from_table(sampling),
                     || match sampling {

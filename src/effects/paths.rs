@@ -4,17 +4,15 @@ use super::surfaces::forms_that;
 use super::{Effect, Row, when};
 use crate::cells::obstacle;
 use crate::materials::diffuse;
-use crate::settings::Integrator;
 
 pub(super) fn rows() -> Vec<Row> {
-    let lecture = |integrator| matches!(integrator, Integrator::Lecture { .. });
     vec![
         Row::new(
             Effect::Lecture,
             "lecture",
             "uniform hemisphere, constant probability of termination",
-            move |asked| {
-                when(lecture(asked.settings.integrator), || {
+            |asked| {
+                when(asked.settings.integrator.is_lecture(), || {
                     "--integrator lecture".into()
                 })
             },
@@ -24,10 +22,9 @@ pub(super) fn rows() -> Vec<Row> {
             Effect::Roulette,
             "roulette",
             "Russian roulette on the throughput",
-            move |asked| {
-                let integrator = asked.settings.integrator;
-                when(asked.settings.roulette && !lecture(integrator), || {
-                    format!("integrator {}", integrator.name())
+            |asked| {
+                when(asked.settings.has_roulette(), || {
+                    format!("integrator {}", asked.settings.integrator.name())
                 })
             },
         )

@@ -213,11 +213,11 @@ impl Choices {
                 Integrator::Lecture { termination } => Some(termination),
                 _ => None,
             },
-            light_sampling: settings.light_sampling.name().into(),
+            light_sampling: settings.light_sampling().name().into(),
             sampler: settings.sampler.name().into(),
             max_bounces: settings.max_bounces,
             radiance_cache: settings.radiance_cache,
-            roulette: settings.roulette,
+            roulette: settings.has_roulette(),
             offset: settings.offset.to_string(),
             adaptive: settings.adaptive,
             classes: settings.classes,
@@ -252,6 +252,8 @@ impl Choices {
         let integrator = named("integrator", &self.integrator, Integrator::ALL, |i| {
             i.name()
         })?;
+        let sampling = &self.light_sampling;
+        let light_sampling = named("light sampling", sampling, LightSampling::ALL, |l| l.name())?;
         let time = goal.time.map(Duration::try_from_secs_f64).transpose();
         let [start, end] = goal.samples;
         Ok(Settings {
@@ -262,15 +264,11 @@ impl Choices {
             seed: self.seed,
             max_bounces: self.max_bounces,
             integrator: integrator.with_termination(self.termination.unwrap_or_default()),
-            light_sampling: named(
-                "light sampling",
-                &self.light_sampling,
-                LightSampling::ALL,
-                |l| l.name(),
-            )?,
+            // The file has what is done, also by an estimator that does nothing of it.
+            light_sampling: integrator.samples_lights().then_some(light_sampling),
             sampler: named("sampler", &self.sampler, Sampler::ALL, |s| s.name())?,
             radiance_cache: self.radiance_cache,
-            roulette: self.roulette,
+            roulette: (!integrator.is_lecture()).then_some(self.roulette),
             geometry: named("geometry", &self.geometry, GeometryChoice::ALL, |g| {
                 g.name()
             })?,

@@ -163,14 +163,15 @@ fn change(
         }
         Effect::Lights | Effect::Skylight => {
             settings.integrator = Integrator::Bsdf;
+            settings.light_sampling = None;
             "--integrator bsdf"
         }
         Effect::Projected => {
-            settings.light_sampling = LightSampling::Cone;
+            settings.light_sampling = Some(LightSampling::Cone);
             "--light-sampling cone"
         }
-        Effect::Table if settings.light_sampling == LightSampling::Cone => {
-            settings.light_sampling = LightSampling::Projected;
+        Effect::Table if settings.light_sampling() == LightSampling::Cone => {
+            settings.light_sampling = Some(LightSampling::Projected);
             "--light-sampling projected"
         }
         Effect::Table => return Err("so many lamps are not weighed at each vertex".into()),
@@ -183,7 +184,7 @@ fn change(
             "--radiance-cache off"
         }
         Effect::Roulette => {
-            settings.roulette = false;
+            settings.roulette = Some(false);
             "--roulette off"
         }
     })

@@ -332,7 +332,7 @@ impl PathTracer<'_> {
         let largest = (path.throughput.abs() * path.eta_scale).max_element();
         let survival = match self.settings.integrator {
             Integrator::Lecture { termination } => 1.0 - termination,
-            _ if self.settings.roulette => roulette_survival(largest),
+            _ if self.settings.has_roulette() => roulette_survival(largest),
             _ => 1.0,
         };
         if largest <= 0.0 || u >= survival {
@@ -438,14 +438,14 @@ impl PathTracer<'_> {
         let sphere = &self.placement.spheres[hit.index];
         let aim = aim_at(sphere, ray.anchor, ray.offset, ray.motion, ray.time);
         let pdf_per_weight =
-            (!lights.from_table(self.settings.light_sampling)).then_some(from.pdf_per_weight);
+            (!lights.from_table(self.settings.light_sampling())).then_some(from.pdf_per_weight);
         let share = self.sky().map_or(1.0, |_| 1.0 - SKY_SHARE);
         self.share_of_hit(from.pdf, share * light_pdf(light, &aim, pdf_per_weight))
     }
 
     /// A direction to a lamp or to the image.
     fn sample_direction(&self, vertex: &Vertex, own: usize, u: [f64; 4]) -> Option<LightSample> {
-        let sampling = self.settings.light_sampling;
+        let sampling = self.settings.light_sampling();
         let lamp = |u| sample_light(self.placement, sampling, vertex, own, u);
         let Some((sky, table)) = self.sky() else {
             return lamp(u);

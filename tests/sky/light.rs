@@ -421,7 +421,7 @@ fn rendered(scene: &Scene, how: (Integrator, LightSampling, GeometryChoice), spp
     let (integrator, light_sampling, geometry) = how;
     let settings = Settings {
         integrator,
-        light_sampling,
+        light_sampling: integrator.samples_lights().then_some(light_sampling),
         geometry,
         ..settings(scene, 24, 18, spp)
     };
@@ -492,7 +492,7 @@ fn every_geometry_has_the_same_paths_as_the_reference() {
         for integrator in [Integrator::Path, Integrator::Nee] {
             let of = |geometry| Settings {
                 integrator,
-                light_sampling: sampling,
+                light_sampling: Some(sampling),
                 geometry,
                 ..settings(&scene, 24, 18, 4)
             };
