@@ -1,5 +1,7 @@
 //! What renders: an opened GPU, or the CPU reference.
 
+pub mod cpu;
+
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
@@ -8,9 +10,9 @@ use crate::gpu::device::{self, DRIVER_ADVICE, DeviceChoice, Gpu};
 use crate::gpu::renderer::GpuRenderer;
 use crate::job::Job;
 use crate::numbers::significant;
-use crate::reference::renderer::{self, ReferenceRenderer};
 use crate::render::Renderer;
 use crate::settings::{Rect, Settings};
+use cpu::ReferenceRenderer;
 
 /// What renders.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -132,8 +134,8 @@ impl Backend {
             // A copy of what comes from the device, region by region.
             Self::Gpu(_) => window,
             // Boxed, with what the heap adds.
-            Self::Cpu { .. } if aovs > 0 => renderer::PIXEL_BYTES + aovs + 16,
-            Self::Cpu { .. } => renderer::PIXEL_BYTES,
+            Self::Cpu { .. } if aovs > 0 => cpu::PIXEL_BYTES + aovs + 16,
+            Self::Cpu { .. } => cpu::PIXEL_BYTES,
         };
         film + (window + renderer).max(file_bytes(layers(settings)))
     }

@@ -8,15 +8,14 @@
 
 use glam::DVec3;
 
-use crate::cells::obstacle;
-use crate::effects::Effect;
+use crate::backend::cpu::ReferenceRenderer;
+use crate::effects::{Effect, cache_obstacle};
 use crate::error::Result;
 use crate::film::{Estimate, Film, LEAST_SAMPLES};
 use crate::job::{Job, prepare};
 use crate::placement::Placement;
 use crate::reference::cells::Cache;
 use crate::reference::path::PathTracer;
-use crate::reference::renderer::ReferenceRenderer;
 use crate::reference::survey::survey;
 use crate::render::render_quietly;
 use crate::sampler::Sampler;
@@ -252,7 +251,7 @@ fn pilot(settings: &Settings, integrator: Integrator, pixels: f64) -> Settings {
 fn with_cells(scene: &Scene, settings: &Settings, job: Job) -> Option<(Job, Vec<DVec3>)> {
     let settings = Candidate::RadianceCache.settings(settings);
     let placement = Placement::new(scene, settings.width, settings.height);
-    if obstacle(scene, &placement, &settings).is_some() {
+    if cache_obstacle(scene, &placement, &settings).is_some() {
         return None;
     }
     let cells = survey(scene, &placement, &settings);

@@ -1,6 +1,7 @@
 //! What can go wrong, and the exit code of each.
 
 use std::fmt;
+use std::io;
 use std::path::PathBuf;
 
 /// Every error of the program. The message is complete: it names the file, the option or the
@@ -25,7 +26,7 @@ pub enum Error {
         /// The file.
         path: PathBuf,
         /// The system's reason.
-        source: std::io::Error,
+        source: io::Error,
     },
     /// No adapter, or none that fits what was asked for.
     #[error("{0}")]
@@ -97,3 +98,18 @@ impl Error {
 
 /// The result of everything that can fail.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
+
+/// What is wrong with the bytes of a file.
+pub(crate) fn invalid(text: impl Into<String>) -> io::Error {
+    io::Error::new(io::ErrorKind::InvalidData, text.into())
+}
+
+/// A part of a file as a message may show it: what is corrupt can be long and hold control
+/// characters.
+pub(crate) fn shown(text: &str) -> String {
+    let visible = |c: char| match c {
+        '\'' | '"' => vec![c],
+        _ => c.escape_debug().collect(),
+    };
+    text.trim().chars().take(80).flat_map(visible).collect()
+}

@@ -4,11 +4,11 @@
 //! compared that a check refuses. What only a device or the memory can tell is left to the
 //! [backend](crate::backend).
 
-use crate::cells::{Cells, obstacle};
 use crate::claims::Claims;
-use crate::effects::{BAKED_MOST, Effect, Effects};
+use crate::effects::{BAKED_MOST, Effect, Effects, cache_obstacle};
 use crate::error::{Error, Result};
 use crate::film::PILOT_SAMPLES;
+use crate::placement::cells::Cells;
 use crate::placement::media::MAX_LEVELS;
 use crate::placement::{Placement, Side};
 use crate::reference::survey::survey;
@@ -95,7 +95,7 @@ impl Job {
     #[must_use]
     pub fn cache_obstacle(&self) -> Option<&'static str> {
         let is_asked_for = self.settings.radiance_cache && self.cells().is_none();
-        let why = || obstacle(&self.scene, &self.placement, &self.settings);
+        let why = || cache_obstacle(&self.scene, &self.placement, &self.settings);
         is_asked_for.then(why).flatten()
     }
 

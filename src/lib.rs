@@ -31,7 +31,6 @@
 
 pub mod backend;
 pub mod bvh;
-pub mod cells;
 pub mod check;
 pub mod choice;
 pub mod claims;
@@ -54,9 +53,11 @@ pub mod output;
 pub mod particles;
 pub mod placement;
 pub mod prices;
+pub mod records;
 pub mod reference;
 pub mod render;
 pub mod sampler;
+pub mod sampling;
 pub mod scene;
 pub mod settings;
 pub mod shader;

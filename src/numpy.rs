@@ -4,7 +4,7 @@
 
 use std::io::{self, Read};
 
-use crate::input::{invalid, shown};
+use crate::error::{invalid, shown};
 
 /// The longest header that is read. Ours take 128 bytes; one of a plain array never comes near
 /// this, and a corrupt length must not decide how much memory is taken.

@@ -42,7 +42,7 @@ pub struct Settings {
     /// How the random numbers of samples are placed.
     pub sampler: Sampler,
     /// Whether diffuse surfaces that paths come to from diffuse ones reflect by values of cells, drawn anew for every
-    /// batch of samples and corrected without bias, where nothing [stands against it](crate::cells::obstacle).
+    /// batch of samples and corrected without bias, where nothing [stands against it](crate::effects::cache_obstacle).
     pub radiance_cache: bool,
     /// Whether paths end by Russian roulette on their throughput; `None`: as the estimator has it. The lecture's
     /// has its own, and no other.

@@ -4,9 +4,9 @@
 use std::collections::BTreeSet;
 
 use crate::film::{Estimate, Film};
-use crate::materials::Form;
+use crate::materials::{Form, Material};
 use crate::placement::{PlacedSphere, Placement, Side};
-use crate::scene::{Environment, Material, Scene};
+use crate::scene::{Environment, Scene};
 use crate::settings::{Integrator, Settings};
 
 /// A bound on the share of the image's energy that the bounce limit removed, a fraction; 0 if it cut

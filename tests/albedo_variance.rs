@@ -9,7 +9,7 @@
 use glam::{DVec2, DVec3};
 use gpu_trace::materials::car_paint::CarPaint;
 use gpu_trace::materials::{ALL, MaterialKind, Surface, luminance};
-use gpu_trace::reference::core::sampling::{basis_around, cosine_direction};
+use gpu_trace::sampling::directions::{basis_around, cosine_direction};
 use gpu_trace::statistics::mean_and_error;
 use gpu_trace::verify::Random;
 use gpu_trace::verify::bsdf::draw::OFFSETS;

@@ -8,9 +8,10 @@ use gpu_trace::bvh::{Ball, MOST_SAH_LEVELS, NOTHING, Options, Tree, WIDTH};
 use gpu_trace::effects::Effects;
 use gpu_trace::gpu::probe::Probe;
 use gpu_trace::materials;
+use gpu_trace::materials::Material;
 use gpu_trace::placement::{Placement, Side};
 use gpu_trace::render::render_quietly;
-use gpu_trace::scene::{Material, Scene};
+use gpu_trace::scene::Scene;
 use gpu_trace::settings::{GeometryChoice, Settings};
 use gpu_trace::verify::{
     Crowd, EMPTY, HitRow, Random, RayRows, Row, crowds, image_bits, settings, share_off, vector,

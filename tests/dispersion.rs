@@ -5,7 +5,7 @@ use glam::{DVec2, DVec3};
 use gpu_trace::film::Film;
 use gpu_trace::materials::dielectric::{Glass, Index};
 use gpu_trace::materials::{Bsdf as _, MaterialKind};
-use gpu_trace::reference::core::spectrum::{INTEGRALS, srgb};
+use gpu_trace::sampling::spectrum::{INTEGRALS, srgb};
 use gpu_trace::scene::Scene;
 use gpu_trace::settings::{Integrator, Settings};
 use gpu_trace::statistics::normal_limit;

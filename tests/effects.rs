@@ -13,13 +13,12 @@ use glam::{DVec2, DVec3};
 use gpu_trace::effects::{Effect, Effects, table};
 use gpu_trace::image::Picture;
 use gpu_trace::materials::texturable::{texturable_key, textured_keys};
-use gpu_trace::materials::{ALL, MaterialKind, forms};
+use gpu_trace::materials::{ALL, Material, MaterialKind, Texture, TextureImage, forms};
 use gpu_trace::placement::Placement;
 use gpu_trace::placement::lights::MOST_WEIGHED;
 use gpu_trace::sampler::Sampler;
 use gpu_trace::scene::{
-    Camera, Environment, Gradient, Handedness, Material, RenderDefaults, Scene, Sky, Sphere,
-    Texture, TextureImage,
+    Camera, Environment, Gradient, Handedness, RenderDefaults, Scene, Sky, Sphere,
 };
 use gpu_trace::settings::{GeometryChoice, Integrator, LightSampling, Offset, Settings, View};
 use gpu_trace::shader::{Stage, declared_names, link};
@@ -621,7 +620,7 @@ fn unmarked(all: &[(Set, Arc<Linked>)]) -> BTreeMap<&str, Set> {
     with.retain(|name, effects| {
         let marked = effects.iter().any(|effect| effect.row().is_marked(name));
         // Those of a material's module are its own; the dispatch is that of what is in use, and so are the
-        // members of `Material`: see layout.rs.
+        // members of `Material`: see records/material.rs.
         let of_material = name.starts_with("materials::") || name.starts_with("bsdf::");
         let shared = of_media(name) || of_light_sampling(name);
         !effects.is_empty() && !marked && !of_material && !shared && name.contains("::")

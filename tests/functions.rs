@@ -4,10 +4,10 @@
 
 use crate::common::probe;
 use glam::{DVec2, DVec3};
-use gpu_trace::reference::core::sampling::{
+use gpu_trace::reference::scene::sphere::{Quadratic, root_outside, sphere_quadratic};
+use gpu_trace::sampling::directions::{
     basis_around, cap_direction, circle_point, cosine_direction, sphere_direction,
 };
-use gpu_trace::reference::scene::sphere::{Quadratic, root_outside, sphere_quadratic};
 use gpu_trace::verify::{Agreement, Random, Row, ULP, to_row, vector};
 
 const CASES: usize = 100_000;

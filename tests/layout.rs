@@ -5,15 +5,16 @@ use std::mem::offset_of;
 use crate::common::scene;
 use glam::DVec3;
 use gpu_trace::effects::Effects;
-use gpu_trace::gpu::layout::{
-    CameraRecord, ChartRecord, CountersRecord, DispatchRecord, LightRecord, MaterialRecord,
-    PilotRecord, PoleRecord, SphereRecord,
-};
 use gpu_trace::gpu::probe::ShapeRecord;
+use gpu_trace::materials::Material;
 use gpu_trace::materials::dielectric::Index;
 use gpu_trace::materials::{ALL, Form, Member, MemberKind, MemberValue, forms};
 use gpu_trace::placement::Placement;
-use gpu_trace::scene::Material;
+use gpu_trace::records::layout::{
+    CameraRecord, ChartRecord, CountersRecord, DispatchRecord, LightRecord, PilotRecord,
+    PoleRecord, SphereRecord,
+};
+use gpu_trace::records::material::MaterialRecord;
 use gpu_trace::settings::Settings;
 use gpu_trace::shader::{Kernel, Stage, link, material_members};
 use gpu_trace::verify::EMPTY;

@@ -3,12 +3,13 @@
 //! That the kernel traces the reference's paths is in `agreement`, that any split gives the same bits in `claims`.
 
 use glam::DVec2;
-use gpu_trace::cells::chart::{Chart, EVEN};
-use gpu_trace::cells::{Cells, obstacle};
+use gpu_trace::effects::cache_obstacle;
 use gpu_trace::film::Film;
 use gpu_trace::gpu::renderer::GpuRenderer;
 use gpu_trace::job::Job;
 use gpu_trace::placement::Placement;
+use gpu_trace::placement::cells::Cells;
+use gpu_trace::placement::cells::chart::{Chart, EVEN};
 use gpu_trace::render::render_quietly;
 use gpu_trace::sampler::Sampler;
 use gpu_trace::scene::Scene;
@@ -422,7 +423,7 @@ fn it_is_off_where_it_would_not_be_right() {
             ..cached(&scene, 64, 64, 64)
         };
         let placement = Placement::new(&scene, 64, 64);
-        let why = obstacle(&scene, &placement, &settings);
+        let why = cache_obstacle(&scene, &placement, &settings);
         assert!(why.is_some_and(|why| why.contains(word)), "{name}: {why:?}");
     }
 }

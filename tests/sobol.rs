@@ -2,10 +2,8 @@
 //! uniform numbers, and nothing in common between vertices, scrambles and pixels.
 
 use crate::common::probe;
-use gpu_trace::reference::core::random::{random_words, sample_key, unit_float};
-use gpu_trace::reference::core::sobol::{
-    owen_scramble, shuffled, sobol_point, sobol_words, sobol4,
-};
+use gpu_trace::sampling::random::{random_words, sample_key, unit_float};
+use gpu_trace::sampling::sobol::{owen_scramble, shuffled, sobol_point, sobol_words, sobol4};
 use gpu_trace::settings::stream_words;
 use gpu_trace::statistics::{SIGNIFICANCE, correlation, mean_and_error, sidak, uniform_ks};
 use gpu_trace::verify::Random;

@@ -1,7 +1,7 @@
 //! The sample stream: the same bits in WGSL and in Rust, and uniform, independent numbers.
 
 use crate::common::probe;
-use gpu_trace::reference::core::random::{mix_bits, sample_key, unit_float};
+use gpu_trace::sampling::random::{mix_bits, sample_key, unit_float};
 use gpu_trace::settings::stream_words;
 use gpu_trace::statistics::{SIGNIFICANCE, correlation, sidak, uniform_ks};
 use gpu_trace::verify::Random;
@@ -71,7 +71,7 @@ fn differences(keys: &[Key], host: impl Fn(&Key) -> [f64; 4]) -> usize {
 /// The stream as one function of all that it depends on.
 fn random4(stream: [u32; 2], pixel: [u32; 2], sample_low: u32, dimension: u32) -> [f64; 4] {
     let key = sample_key(stream, pixel, sample_low);
-    gpu_trace::reference::core::random::random4(key, dimension)
+    gpu_trace::sampling::random::random4(key, dimension)
 }
 
 #[test]

@@ -14,10 +14,10 @@ mod naive;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use gpu_trace::backend::cpu::ReferenceRenderer;
 use gpu_trace::gpu::device::{self, DeviceChoice};
 use gpu_trace::gpu::renderer::GpuRenderer;
 use gpu_trace::job::prepare;
-use gpu_trace::reference::renderer::ReferenceRenderer;
 use gpu_trace::render::{Renderer, render_quietly};
 use gpu_trace::scene::{Scene, builtin, load};
 use gpu_trace::settings::Settings;

@@ -4,10 +4,10 @@ use std::time::Instant;
 
 use glam::DVec3;
 use gpu_trace::bvh::Tree;
-use gpu_trace::materials::MaterialKind;
 use gpu_trace::materials::diffuse::Diffuse;
+use gpu_trace::materials::{Material, MaterialKind};
 use gpu_trace::placement::Placement;
-use gpu_trace::scene::{Camera, Environment, Handedness, Material, RenderDefaults, Scene, Sphere};
+use gpu_trace::scene::{Camera, Environment, Handedness, RenderDefaults, Scene, Sphere};
 use gpu_trace::settings::{GeometryChoice, Rect, Settings};
 use gpu_trace::verify::Random;
 

@@ -6,7 +6,7 @@ use crate::effects::Effects;
 use crate::error::Result;
 use crate::gpu::probe::Probe;
 use crate::placement::Placement;
-use crate::reference::core::spectrum::{sample_wavelength, srgb};
+use crate::sampling::spectrum::{sample_wavelength, srgb};
 use crate::scene::Scene;
 use crate::settings::Settings;
 use crate::verify::{Measure, Random, Row, SceneText, ULP, vector};

@@ -4,7 +4,7 @@ use super::Case;
 use super::context::Context;
 use super::film::{mixed, must, sized};
 use crate::error::Result;
-use crate::reference::core::random::{random4, sample_key};
+use crate::sampling::random::{random4, sample_key};
 use crate::settings::{Settings, stream_words};
 use crate::statistics::{correlation, sidak, uniform_ks};
 use crate::verify::{Measure, Random, share_off};

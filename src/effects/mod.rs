@@ -9,6 +9,7 @@
 
 mod geometry;
 mod light;
+mod obstacle;
 mod paths;
 mod role;
 mod samples;
@@ -19,12 +20,13 @@ use std::collections::BTreeSet;
 use std::sync::LazyLock;
 
 use crate::materials::texturable::textured_keys;
-use crate::materials::{Form, flakes, forms, measured, mix};
+use crate::materials::{Form, Material, flakes, forms, measured, mix};
 use crate::placement::{PlacedSphere, Placement};
-use crate::scene::{Material, Scene};
+use crate::scene::Scene;
 use crate::settings::Settings;
 
 pub use geometry::{BAKED_LIMIT, BAKED_MOST};
+pub use obstacle::cache_obstacle;
 pub use role::Role;
 
 /// An effect: something that a kernel can have or not.

@@ -1,8 +1,7 @@
 //! Effects of how paths go on and where they end.
 
 use super::surfaces::forms_that;
-use super::{Effect, Row, when};
-use crate::cells::obstacle;
+use super::{Effect, Row, cache_obstacle, when};
 use crate::materials::diffuse;
 
 pub(super) fn rows() -> Vec<Row> {
@@ -37,7 +36,7 @@ pub(super) fn rows() -> Vec<Row> {
             |asked| {
                 let settings = asked.settings;
                 let is_used = settings.radiance_cache
-                    && obstacle(asked.scene, asked.placement, settings).is_none();
+                    && cache_obstacle(asked.scene, asked.placement, settings).is_none();
                 when(is_used, || "--radiance-cache on".into())
             },
         )

@@ -3,7 +3,7 @@
 use super::surfaces::forms_that;
 use super::{Effect, Row};
 use crate::materials::texturable::{EMISSION, WEIGHT, flag, texture_member, textured_keys};
-use crate::scene::{Material, Texture};
+use crate::materials::{Material, Texture};
 
 /// All keys that may be textures.
 fn keys() -> Vec<Effect> {

@@ -9,9 +9,9 @@ use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipArchive, ZipWriter};
 
 use super::About;
+use crate::error::invalid;
 use crate::film::{AovSums, Counts, Film, Record};
 use crate::image::Format;
-use crate::input::invalid;
 use crate::numpy::Header;
 use crate::output::npy::header;
 use crate::settings::Rect;

@@ -17,9 +17,8 @@ pub use about::{About, Choices, Command, FORMAT, Goal, Maker};
 pub use scene::SceneRecord;
 use serde::Deserialize;
 
-use crate::error::{Action, Error, Result};
+use crate::error::{Action, Error, Result, invalid};
 use crate::film::Film;
-use crate::input::invalid;
 use crate::output::atomic;
 
 /// A film with what there is to say of it.

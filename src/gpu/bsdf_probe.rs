@@ -7,9 +7,9 @@ use crate::effects::Effects;
 use crate::error::Result;
 use crate::gpu::device::Gpu;
 use crate::gpu::probe::Probe;
-use crate::materials::{MaterialKind, Surface};
+use crate::materials::{Material, MaterialKind, Surface};
 use crate::placement::Placement;
-use crate::scene::{Camera, Handedness, Material, RenderDefaults, Scene, Sphere};
+use crate::scene::{Camera, Handedness, RenderDefaults, Scene, Sphere};
 use crate::settings::{GeometryChoice, Integrator, Settings};
 
 /// A question to a BSDF.

@@ -5,11 +5,11 @@ use std::sync::Arc;
 
 use bytemuck::Zeroable as _;
 
-use crate::cells::Cells;
 use crate::error::{Error, Result};
 use crate::gpu::device::Gpu;
 use crate::gpu::engine::{Engine, Pass, Program, Readings, Recording};
-use crate::gpu::layout::{CELLS_WIDTH, PilotRecord};
+use crate::placement::cells::Cells;
+use crate::records::layout::{CELLS_WIDTH, PilotRecord};
 use crate::settings::{Rect, pilot_words};
 
 /// Buffers and textures by their names in `shaders/`.

@@ -7,17 +7,17 @@ use crate::bvh::WIDTH;
 use crate::effects::{Effect, Effects};
 use crate::error::{Error, Result};
 use crate::gpu::engine::{Pass, Recording};
-use crate::gpu::layout::{
-    ChartRecord, LightRecord, PoleRecord, SKY_TABLE_WIDTH, SphereRecord, anchored_spheres,
-    light_weight, sky_table,
-};
-use crate::gpu::measured::{MEASURED_WIDTH, MeasuredTables};
-use crate::gpu::tables::SceneTables;
-use crate::gpu::textures::{IMAGE_WIDTH, TextureTable};
 use crate::image::Picture;
 use crate::materials::Member;
 use crate::placement::Placement;
 use crate::placement::containment::MOST_CORES;
+use crate::records::layout::{
+    ChartRecord, LightRecord, PoleRecord, SKY_TABLE_WIDTH, SphereRecord, light_weight, sky_table,
+};
+use crate::records::material::anchored_spheres;
+use crate::records::measured::{MEASURED_WIDTH, MeasuredTables};
+use crate::records::tables::SceneTables;
+use crate::records::textures::{IMAGE_WIDTH, TextureTable};
 use crate::scene::{Environment, Scene, Sky};
 use crate::shader::{Kernel, material_members};
 
@@ -343,7 +343,8 @@ fn materials(
 
 fn parts(kernel: &Kernel, effects: &Effects, tables: &SceneTables) -> Vec<u8> {
     let (members, size) = material_layout(kernel, effects);
-    tables.mixes.bytes(kernel, (&members, size))
+    let (own, whole) = kernel.struct_members("MixPart").unwrap_or_default();
+    tables.mixes.bytes((&own, whole), (&members, size))
 }
 
 fn patterns(kernel: &Kernel, textures: &TextureTable) -> Vec<u8> {

@@ -14,8 +14,8 @@ use crate::error::{Error, Result};
 use crate::gpu::data::SceneBytes;
 use crate::gpu::device::Gpu;
 use crate::gpu::engine::{Engine, Pass, Program, Recording};
-use crate::gpu::layout::CameraRecord;
 use crate::placement::Placement;
+use crate::records::layout::CameraRecord;
 use crate::scene::Scene;
 use crate::shader::{Kernel, Stage, link};
 

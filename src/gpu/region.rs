@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::film::TILE;
 use crate::film::{NonFinite, PixelSums, Tally};
 use crate::gpu::engine::{Engine, Reading, Readings, Recording};
-use crate::gpu::layout::{ChosenTiles, CountersRecord};
+use crate::records::layout::{ChosenTiles, CountersRecord};
 use crate::settings::Rect;
 
 /// Longest side of a region: images beyond it are rendered in pieces. A multiple of the tile's, and of no

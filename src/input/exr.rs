@@ -14,7 +14,8 @@ use exr::meta::attribute::{AttributeValue, SampleType, Text};
 use exr::meta::header::Header;
 use exr::prelude::{Vec2, f16};
 
-use super::{Encoding, Input, check_size, invalid, shown};
+use super::{Encoding, Input, check_size};
+use crate::error::{invalid, shown};
 use crate::image::exr::{ATTRIBUTE_PREFIX, REC_709, STDERR, channel_name, layer_of};
 use crate::image::{Format, Picture};
 

@@ -8,7 +8,8 @@ use zune_jpeg::zune_core::bytestream::ZCursor;
 use zune_jpeg::zune_core::colorspace::ColorSpace;
 use zune_jpeg::zune_core::options::DecoderOptions;
 
-use super::{check_size, invalid, shown};
+use super::check_size;
+use crate::error::{invalid, shown};
 use crate::image::{Picture, linear};
 
 /// The first bytes of every such file.

@@ -15,7 +15,7 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
-use crate::error::{Action, Error, Result};
+use crate::error::{Action, Error, Result, invalid};
 use crate::image::{Format, Picture};
 
 /// An image and what its file says about it.
@@ -167,18 +167,4 @@ fn check_size(
     Err(invalid(format!(
         "its header promises {width}x{height} pixels, more than its {bytes} bytes can hold"
     )))
-}
-
-pub(crate) fn invalid(text: impl Into<String>) -> io::Error {
-    io::Error::new(io::ErrorKind::InvalidData, text.into())
-}
-
-/// A part of a file as a message may show it: what is corrupt can be long and hold control
-/// characters.
-pub(crate) fn shown(text: &str) -> String {
-    let visible = |c: char| match c {
-        '\'' | '"' => vec![c],
-        _ => c.escape_debug().collect(),
-    };
-    text.trim().chars().take(80).flat_map(visible).collect()
 }

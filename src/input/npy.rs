@@ -6,7 +6,8 @@ use std::io;
 
 use exr::prelude::f16;
 
-use super::{Encoding, Input, invalid, shown};
+use super::{Encoding, Input};
+use crate::error::{invalid, shown};
 use crate::image::{Format, Picture};
 use crate::numpy::Header;
 

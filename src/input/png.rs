@@ -7,7 +7,8 @@ use std::io::{self, Cursor};
 
 use png::{BitDepth, ColorType, Decoder, DecodingError, Info, Limits, Transformations};
 
-use super::{Encoding, Input, check_size, invalid, shown};
+use super::{Encoding, Input, check_size};
+use crate::error::{invalid, shown};
 use crate::image::{Format, Picture, linear};
 
 /// Deflate packs by at most this.

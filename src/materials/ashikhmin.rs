@@ -14,7 +14,7 @@ use super::{
     Bsdf, BsdfSample, BsdfValue, Form, Member, MemberValue, Mistake, Surface, Value, luminance,
     schema,
 };
-use crate::reference::core::sampling::{circle_point, cosine_direction};
+use crate::sampling::directions::{circle_point, cosine_direction};
 
 #[cfg(test)]
 mod tests;

@@ -8,7 +8,7 @@ use serde::Deserialize;
 
 use super::uniform::cosine_moment;
 use super::{Bsdf, BsdfSample, BsdfValue, Event, Form, MemberValue, Surface, Value};
-use crate::reference::core::sampling::cosine_direction;
+use crate::sampling::directions::cosine_direction;
 
 /// Its type in scene files.
 pub const NAME: &str = "diffuse";

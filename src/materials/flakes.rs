@@ -9,8 +9,8 @@ use super::ggx::Frame;
 use super::lattice::{LatticePoint, anchor_members};
 use super::schema;
 use super::{Form, Member, MemberValue, Surface, Value};
-use crate::reference::core::random::{mix_bits, unit_float};
-use crate::reference::core::sampling::circle_point;
+use crate::sampling::directions::circle_point;
+use crate::sampling::random::{mix_bits, unit_float};
 
 const FLAKE_KEY: u32 = 0x464c_414b;
 

@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use glam::{DVec2, DVec3};
 
-use crate::reference::core::sampling::basis_around;
+use crate::sampling::directions::basis_around;
 
 /// The least roughness of a surface that is not smooth.
 pub const LEAST_ALPHA: f64 = 1.0e-3;

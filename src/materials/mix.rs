@@ -6,13 +6,13 @@ use serde::Deserialize;
 
 use super::lobes::Lobes;
 use super::{
-    Bsdf, BsdfSample, BsdfValue, Event, Form, MaterialKind, Member, MemberValue, Surface, Value,
+    Bsdf, BsdfSample, BsdfValue, Event, Form, Material, MaterialKind, Member, MemberValue, Surface,
+    Texture, Value,
 };
-use crate::scene::{Material, Texture};
 
 pub(super) const NAME: &str = "mix";
 
-/// Where the parts of a material begin and end among those of all: the scene's to say (`gpu/mix.rs`).
+/// Where the parts of a material begin and end among those of all: the scene's to say (`records/mix.rs`).
 pub const PARTS: [Member; 2] = [Member::word("first_part"), Member::word("end_part")];
 
 pub(super) const FORMS: &[Form] = &[Form {

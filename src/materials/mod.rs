@@ -15,11 +15,13 @@ pub mod ggx;
 mod hemisphere;
 pub mod lattice;
 pub mod lobes;
+pub mod material;
 mod paint;
 pub mod powers;
 mod scattered;
 pub mod schema;
 pub mod texturable;
+pub mod texture;
 mod uniform;
 mod value;
 
@@ -36,7 +38,9 @@ use mix::Part;
 
 pub use contract::{BsdfSample, BsdfValue, Event, Surface};
 pub use form::{Form, Member, MemberKind, MemberValue};
+pub use material::Material;
 pub use texturable::Texturable;
+pub use texture::{Texture, TextureImage, Textured};
 pub use uniform::sample_uniform;
 pub use value::Value;
 

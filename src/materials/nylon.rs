@@ -13,7 +13,7 @@ use super::scattered::{MARGIN, gains_energy, most_scattered};
 use super::{
     Bsdf, BsdfSample, BsdfValue, Form, Member, MemberValue, Surface, Value, luminance, schema,
 };
-use crate::reference::core::sampling::{circle_point, cosine_direction};
+use crate::sampling::directions::{circle_point, cosine_direction};
 
 #[cfg(test)]
 mod tests;

@@ -9,7 +9,7 @@ use super::beckmann::{Facets, beckmann_normal};
 use super::ggx::Frame;
 use super::lobes::{Lobes, Pair, arrival, schlick};
 use super::{BsdfSample, BsdfValue};
-use crate::reference::core::sampling::cosine_direction;
+use crate::sampling::directions::cosine_direction;
 
 /// Cook and Torrance's lobe.
 #[derive(Clone, Copy, Debug)]

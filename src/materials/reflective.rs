@@ -11,7 +11,7 @@ use super::uniform::cosine_moment;
 use super::{
     Bsdf, BsdfSample, BsdfValue, Event, Form, Member, MemberValue, Surface, Value, luminance,
 };
-use crate::reference::core::sampling::{cap_direction, cosine_direction};
+use crate::sampling::directions::{cap_direction, cosine_direction};
 
 pub(super) const NAME: &str = "reflective";
 

@@ -5,7 +5,7 @@ use std::f64::consts::FRAC_PI_4;
 use glam::DVec3;
 
 use super::{Bsdf, Surface};
-use crate::reference::core::sampling::basis_around;
+use crate::sampling::directions::basis_around;
 
 /// By how much [`most_scattered`] may be too low: the tests compare it with quadrature.
 pub(super) const MARGIN: f64 = 1.02;

@@ -10,7 +10,7 @@ use super::ggx::Frame;
 use super::lobes::{Pair, arrival};
 use super::powers::{expm1_over, log_of, log1p_over};
 use super::{Bsdf, BsdfSample, BsdfValue, Event, Form, Member, MemberValue, Surface, Value};
-use crate::reference::core::sampling::{circle_point, sphere_direction};
+use crate::sampling::directions::{circle_point, sphere_direction};
 
 #[cfg(test)]
 mod tests;

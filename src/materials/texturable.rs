@@ -127,6 +127,12 @@ pub fn texture_member(key: &str) -> Member {
     Member::word(named("texture", key))
 }
 
+/// The member with the code of the form that a surface has where its roughness is 0.
+#[must_use]
+pub fn smooth_kind() -> Member {
+    Member::word("smooth_kind")
+}
+
 /// The name of the effect of a key that is a texture.
 #[must_use]
 pub fn flag(key: &str) -> &'static str {

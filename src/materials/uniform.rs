@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use glam::{DVec2, DVec3};
 
 use super::{Bsdf, BsdfSample, Surface};
-use crate::reference::core::sampling::sphere_direction;
+use crate::sampling::directions::sphere_direction;
 
 /// The lecture's way to sample any material but delta lobes: uniform on the hemisphere, pdf = 1/(2 pi). A delta
 /// lobe beside others is chosen as the material itself does.

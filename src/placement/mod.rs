@@ -7,6 +7,7 @@
 //! its digits where the picture is.
 
 mod camera;
+pub mod cells;
 pub mod containment;
 pub mod lights;
 pub mod media;
@@ -27,10 +28,10 @@ use std::sync::{Arc, OnceLock};
 use glam::DVec3;
 
 use crate::bvh::{Ball, Options, Tree};
-use crate::cells::{Cells, Chart};
 use crate::scene::{Scene, Sky};
 use crate::settings::Offset;
 use camera::approach;
+use cells::{Cells, Chart};
 use containment::{containers, reachable};
 use pole::{pole_normals, pole_point};
 

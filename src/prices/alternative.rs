@@ -7,9 +7,11 @@ use crate::effects::{BAKED_MOST, Effect};
 use crate::job::{Job, prepare};
 use crate::materials::mix::Weight;
 use crate::materials::texturable::{EMISSION, WEIGHT, texturable_key, textured_keys};
-use crate::materials::{MaterialKind, dielectric::Dielectric, diffuse::Diffuse, forms};
+use crate::materials::{
+    Material, MaterialKind, Texture, Textured, dielectric::Dielectric, diffuse::Diffuse, forms,
+};
 use crate::sampler::Sampler;
-use crate::scene::{Material, Scene, Texture, Textured};
+use crate::scene::Scene;
 use crate::settings::{GeometryChoice, Integrator, LightSampling, Offset, Settings};
 
 /// What stands in an effect's place.

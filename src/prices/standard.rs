@@ -12,9 +12,9 @@ use crate::materials::{
     forms,
     texturable::{texturable_key, textured_keys},
 };
-use crate::scene::builtin;
+use crate::materials::{Texture, TextureImage};
 use crate::scene::load::load_str;
-use crate::scene::{Environment, Gradient, Scene, Sky, Sphere, Texture, TextureImage};
+use crate::scene::{Environment, Gradient, Scene, Sky, Sphere, builtin};
 use crate::settings::{
     DEFAULT_TERMINATION, GeometryChoice, Integrator, LightSampling, Offset, Settings, View,
 };

@@ -4,15 +4,15 @@
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::core::random::sample_key;
-use super::core::sobol::sobol4;
 use super::path::{Path, PathResult, PathTracer};
-use super::purpose::{CAMERA, pairs};
 use super::scene::ray::{Hit, Ray, vertex_at};
 use super::scene::sphere::closest_hit;
-use crate::cells::chart::ChartPoint;
-use crate::cells::{Cell, Cells};
 use crate::placement::PlacedSphere;
+use crate::placement::cells::chart::ChartPoint;
+use crate::placement::cells::{Cell, Cells};
+use crate::sampling::purpose::{CAMERA, pairs};
+use crate::sampling::random::sample_key;
+use crate::sampling::sobol::sobol4;
 use crate::settings::pilot_words;
 
 /// The probability with which a value is corrected.

@@ -3,14 +3,10 @@
 use glam::DVec3;
 
 use super::cells::{Begin, Cache};
-use super::core::random::{random4, sample_key};
-use super::core::sobol::sobol4;
-use super::core::spectrum::sample_wavelength;
 use super::light::aim::aim_at;
 use super::light::environment::{environment_radiance, sky_place};
 use super::light::skylight::{NO_SPHERE, SKY_SHARE, sample_sky, sky_density};
 use super::light::sphere::{LightSample, light_pdf, mis_weight, sample_light};
-use super::purpose::{CAMERA, TIME, WAVELENGTH, lighting, scattering};
 use super::scene::absorption::transmittance;
 use super::scene::camera::camera_ray;
 use super::scene::priority::{Media, cross_surface, filling, index_within, relative_index};
@@ -21,6 +17,10 @@ use crate::film::{AovSums, LightClass};
 use crate::materials::{BsdfSample, Event, MaterialKind, Surface, sample_uniform};
 use crate::placement::{Medium, Placement, SkyTable};
 use crate::sampler::Sampler;
+use crate::sampling::purpose::{CAMERA, TIME, WAVELENGTH, lighting, scattering};
+use crate::sampling::random::{random4, sample_key};
+use crate::sampling::sobol::sobol4;
+use crate::sampling::spectrum::sample_wavelength;
 use crate::scene::{Environment, Scene, Sky};
 use crate::settings::{Integrator, Settings, stream_words};
 

@@ -7,9 +7,8 @@ use rayon::prelude::*;
 
 use super::path::PathTracer;
 use super::scene::ray::vertex_at;
-use crate::cells::chart::Chart;
-use crate::cells::obstacle::is_diffuse;
-use crate::cells::{Cell, Cells};
+use crate::placement::cells::chart::Chart;
+use crate::placement::cells::{Cell, Cells};
 use crate::placement::{PlacedSphere, Placement, Side};
 use crate::scene::Scene;
 use crate::settings::Settings;
@@ -34,7 +33,10 @@ pub fn survey(scene: &Scene, placement: &Placement, settings: &Settings) -> Cell
     };
     let tracer = PathTracer::new(scene, placement, &settings);
     let spheres = &placement.spheres;
-    let is_diffuse: Vec<bool> = spheres.iter().map(|s| is_diffuse(scene, s)).collect();
+    let is_diffuse: Vec<bool> = spheres
+        .iter()
+        .map(|s| scene.materials[s.material].is_diffuse())
+        .collect();
     let has_cells: Vec<bool> = std::iter::zip(spheres, &is_diffuse)
         .map(|(sphere, diffuse)| {
             let dark = scene.materials[sphere.material].emission == DVec3::ZERO;

@@ -6,10 +6,10 @@ use std::fmt::{self, Write};
 use glam::DVec3;
 
 use super::load::Loaded;
-use super::{Environment, Gradient, Handedness, Scene, Texture, Textured};
+use super::{Environment, Gradient, Handedness, Scene};
 use crate::materials::measured::Measured;
 use crate::materials::texturable::EMISSION;
-use crate::materials::{Bsdf as _, MaterialKind};
+use crate::materials::{Bsdf as _, MaterialKind, Texture, Textured};
 use crate::numbers::significant;
 
 /// So many lights are listed one by one.

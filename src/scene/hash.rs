@@ -8,11 +8,11 @@ use std::path::Path;
 use fnv::FnvHasher;
 use glam::DVec3;
 
-use super::{Environment, Gradient, Handedness, Scene, Texture, Textured};
+use super::{Environment, Gradient, Handedness, Scene};
 use crate::image::Picture;
 use crate::materials::mix::Weight;
 use crate::materials::texturable::WEIGHT;
-use crate::materials::{MaterialKind, Value};
+use crate::materials::{MaterialKind, Texture, Textured, Value};
 
 /// Hash of everything in the scene that the image depends on: 16 hexadecimal digits.
 ///

@@ -5,11 +5,11 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use super::named;
 use super::report::{Problem, Report};
 use super::validate::MaterialKeys;
-use super::{Material, named};
-use crate::materials::MaterialKind;
 use crate::materials::measured::{BrdfTable, MERL_BYTES, parse};
+use crate::materials::{Material, MaterialKind};
 
 /// Gives measured materials their tables, each file read once. `files` gets what they name, relative to `folder`.
 pub(super) fn apply(

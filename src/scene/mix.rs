@@ -5,12 +5,11 @@ use std::ops::Range;
 
 use glam::DVec3;
 
-use super::Material;
 use super::report::{Problem, Report};
 use super::validate::{MaterialKeys, unknown_material};
-use crate::materials::MaterialKind;
 use crate::materials::mix::{Factor, MOST_PARTS, Part, Weight};
 use crate::materials::texturable::{EMISSION, WEIGHT};
+use crate::materials::{Material, MaterialKind};
 
 /// Gives mixes their parts, of materials that are whole; mixes of mixes have those of all. What else is used where a used
 /// one is comes into `used`.

@@ -13,7 +13,6 @@ mod file;
 mod hash;
 mod image;
 pub mod load;
-pub mod material;
 mod measured;
 mod mix;
 pub mod motion;
@@ -26,7 +25,6 @@ mod range;
 mod report;
 mod shape;
 mod suggest;
-pub mod texture;
 mod texture_table;
 mod validate;
 mod view;
@@ -36,8 +34,6 @@ pub use environment::{Environment, Gradient, Sky};
 pub use file::{MAX_BOUNCES, MAX_SIDE, MAX_SPP, json_schema};
 pub use hash::{content_hash, file_hash};
 pub use load::Loaded;
-pub use material::Material;
-pub use texture::{Texture, TextureImage, Textured};
 
 use glam::DVec3;
 

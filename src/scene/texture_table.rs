@@ -11,15 +11,14 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue, ValueDeserializer};
 
 use super::file::ScaleValue;
+use super::image;
 use super::report::{Problem, Report};
 use super::suggest::list;
-use super::texture::{Texture, TextureImage};
 use super::validate::vector;
-use super::{Material, image};
 use crate::image::Picture;
 use crate::materials::schema::{axis_mistake, up};
 use crate::materials::texturable::texturable;
-use crate::materials::{Mistake, Texturable};
+use crate::materials::{Material, Mistake, Texturable, Texture, TextureImage};
 
 /// A texture as the file has it.
 #[derive(Debug, Deserialize)]

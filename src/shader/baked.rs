@@ -6,11 +6,12 @@ use std::fmt::Write as _;
 use glam::DVec3;
 
 use super::bsdf::members;
-use crate::cells::Chart;
 use crate::effects::{Effect, Effects};
-use crate::gpu::layout::{MaterialRecord, light_weight};
-use crate::gpu::tables::SceneTables;
+use crate::placement::cells::Chart;
 use crate::placement::{PlacedSphere, Placement, Side};
+use crate::records::layout::light_weight;
+use crate::records::material::MaterialRecord;
+use crate::records::tables::SceneTables;
 use crate::scene::Scene;
 
 /// A WGSL literal of the f32 nearest to `value`.

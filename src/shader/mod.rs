@@ -9,7 +9,7 @@ mod mixes;
 mod names;
 mod sources;
 pub mod steps;
-pub(crate) mod textures;
+mod textures;
 mod without;
 
 pub use bsdf::members as material_members;
@@ -21,12 +21,13 @@ use wesl::{CompileOptions, ManglerKind, ModulePath, VirtualResolver, Wesl};
 use crate::bvh;
 use crate::effects::{Effect, Effects, Role};
 use crate::error::{Error, Result};
-use crate::gpu::layout::{CELLS_WIDTH, SKY_TABLE_WIDTH, anchored_spheres};
-use crate::gpu::measured::MEASURED_WIDTH;
-use crate::gpu::tables::SceneTables;
-use crate::gpu::textures::{IMAGE_WIDTH, TextureTable};
 use crate::materials;
 use crate::placement::{Medium, Placement};
+use crate::records::layout::{CELLS_WIDTH, SKY_TABLE_WIDTH};
+use crate::records::material::anchored_spheres;
+use crate::records::measured::MEASURED_WIDTH;
+use crate::records::tables::SceneTables;
+use crate::records::textures::{IMAGE_WIDTH, TextureTable};
 use crate::scene::{Environment, Scene};
 
 pub use binding::Binding;

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use crate::effects::Effects;
-use crate::materials::texturable::{EMISSION, ROUGHNESS, key_member, texture_member};
+use crate::materials::texturable::{EMISSION, ROUGHNESS, key_member, smooth_kind, texture_member};
 use crate::materials::{Form, Member, Texturable};
 
 /// The form's keys that are textures of some material in the kernel.
@@ -35,11 +35,6 @@ pub(super) fn members(effects: &Effects) -> Vec<Member> {
         }
     }
     members
-}
-
-/// The code of the form where the roughness is 0.
-pub(crate) fn smooth_kind() -> Member {
-    Member::word("smooth_kind")
 }
 
 /// What the function `with_textures` imports.

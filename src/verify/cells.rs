@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use crate::reference::core::sampling::basis_around;
+use crate::sampling::directions::basis_around;
 use crate::statistics::chi_square;
 
 /// What was tested, and the p-value.

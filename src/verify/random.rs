@@ -2,8 +2,8 @@
 
 use glam::{DVec2, DVec3};
 
-use crate::reference::core::random::{random_words, unit_float};
-use crate::reference::core::sampling::sphere_direction;
+use crate::sampling::directions::sphere_direction;
+use crate::sampling::random::{random_words, unit_float};
 
 /// A deterministic source of inputs, by the sample stream itself.
 #[derive(Clone, Debug)]

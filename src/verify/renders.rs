@@ -1,11 +1,11 @@
 //! Renders of a scene, on a device and in f64.
 
+use crate::backend::cpu::ReferenceRenderer;
 use crate::error::Result;
 use crate::film::Film;
 use crate::gpu::device::Gpu;
 use crate::gpu::renderer::GpuRenderer;
 use crate::job::prepare;
-use crate::reference::renderer::ReferenceRenderer;
 use crate::render::render_quietly;
 use crate::scene::Scene;
 use crate::settings::{Rect, Settings};

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
+use gpu_trace::backend::cpu::ReferenceRenderer;
 use gpu_trace::effects::Effects;
 use gpu_trace::film::Film;
 use gpu_trace::gpu::device::{DRIVER_ADVICE, DeviceChoice, Gpu, open};
@@ -12,7 +13,6 @@ use gpu_trace::image::Picture;
 use gpu_trace::job::{Job, prepare};
 use gpu_trace::placement::Placement;
 use gpu_trace::reference::light::aim::{Aim, aim_pole};
-use gpu_trace::reference::renderer::ReferenceRenderer;
 use gpu_trace::scene::Scene;
 use gpu_trace::scene::load::{load_file, load_str};
 use gpu_trace::settings::Settings;

@@ -11,7 +11,7 @@ use std::f64::consts::TAU;
 use glam::DVec3;
 use gpu_trace::film::Film;
 use gpu_trace::image::Picture;
-use gpu_trace::reference::core::sampling::basis_around;
+use gpu_trace::sampling::directions::basis_around;
 use gpu_trace::scene::{Environment, Scene, Sky};
 use gpu_trace::settings::{Integrator, Settings};
 use gpu_trace::statistics::mean_and_error;

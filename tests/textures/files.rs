@@ -5,9 +5,10 @@ use std::path::Path;
 use glam::DVec3;
 use gpu_trace::error::Error;
 use gpu_trace::image::{Picture, linear};
+use gpu_trace::materials::Texture;
 use gpu_trace::output::{Metadata, exr};
 use gpu_trace::scene::load::{Loaded, load_str_in};
-use gpu_trace::scene::{Texture, summary};
+use gpu_trace::scene::summary;
 use image::{ExtendedColorType, ImageFormat};
 
 use super::random_picture;

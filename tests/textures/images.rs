@@ -3,7 +3,8 @@
 use glam::DVec3;
 use gpu_trace::film::Film;
 use gpu_trace::image::Picture;
-use gpu_trace::scene::{Scene, Texture};
+use gpu_trace::materials::Texture;
+use gpu_trace::scene::Scene;
 use gpu_trace::settings::{GeometryChoice, Integrator, LightSampling, Settings};
 use gpu_trace::statistics::mean_and_error;
 use gpu_trace::verify::{ULP, image_bits, means, settings, share_off};

@@ -6,14 +6,15 @@ use std::sync::Arc;
 use glam::DVec3;
 use gpu_trace::effects::Effects;
 use gpu_trace::gpu::probe::Probe;
-use gpu_trace::gpu::textures::TextureTable;
 use gpu_trace::image::Picture;
 use gpu_trace::materials::lattice::LatticePoint;
+use gpu_trace::materials::{Material, Texture, TextureImage};
 use gpu_trace::placement::Placement;
+use gpu_trace::records::textures::TextureTable;
 use gpu_trace::reference::scene::texture::{
     TexturePoint, gradient_noise, image_place, image_value, noise, texture_value,
 };
-use gpu_trace::scene::{Material, Scene, Texture, TextureImage};
+use gpu_trace::scene::Scene;
 use gpu_trace::settings::Settings;
 use gpu_trace::verify::{Agreement, Random, ULP, to_row, vector};
 

@@ -2,8 +2,7 @@
 
 use glam::DVec3;
 use gpu_trace::materials::texturable::{texturable, texturable_key};
-use gpu_trace::materials::{ALL, Value, forms};
-use gpu_trace::scene::{Material, Texture};
+use gpu_trace::materials::{ALL, Material, Texture, Value, forms};
 use gpu_trace::verify::bsdf::Subjects;
 use gpu_trace::verify::bsdf::twin::{Compared, Wrong, samples, values};
 

@@ -9,9 +9,8 @@ use std::sync::Arc;
 
 use glam::DVec3;
 use gpu_trace::image::Picture;
-use gpu_trace::materials::Texturable;
 use gpu_trace::materials::texturable::texturable_key;
-use gpu_trace::scene::{Texture, TextureImage};
+use gpu_trace::materials::{Texturable, Texture, TextureImage};
 use gpu_trace::verify::Random;
 
 /// The albedo of diffuse surfaces.

@@ -10,7 +10,7 @@ use crate::error::Result;
 use crate::gpu::bsdf_probe::BsdfInput;
 use crate::materials::reflective::Reflective;
 use crate::materials::{MaterialKind, Surface};
-use crate::reference::core::sampling::cap_direction;
+use crate::sampling::directions::cap_direction;
 use crate::settings::Integrator;
 use crate::verify::{Measure, Random, Row, ULP, vector};
 

@@ -13,7 +13,7 @@ use glam::DVec3;
 use super::Case;
 use super::context::Context;
 use crate::error::Result;
-use crate::reference::core::sampling::basis_around;
+use crate::sampling::directions::basis_around;
 use crate::verify::{Measure, Random, Row, ULP, to_row, vector};
 
 pub(super) const CASES: &[Case] = &[

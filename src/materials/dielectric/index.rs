@@ -6,7 +6,7 @@ use serde::Deserialize;
 
 use crate::materials::schema::{MAX_MAGNITUDE, vector};
 use crate::materials::{Mistake, Value};
-use crate::reference::core::spectrum::{LONGEST, SHORTEST};
+use crate::sampling::spectrum::{LONGEST, SHORTEST};
 
 /// Media by name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]

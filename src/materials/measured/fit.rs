@@ -7,7 +7,7 @@ use glam::{DVec2, DVec3};
 use crate::materials::ggx::{LEAST_ALPHA, ggx_normal, ggx_pdf};
 use crate::materials::lobes::Pair;
 use crate::materials::luminance;
-use crate::reference::core::sampling::cosine_direction;
+use crate::sampling::directions::cosine_direction;
 
 /// What directions are drawn from: visible GGX normals of one alpha, and the cosine. Their shares depend on the cosine
 /// of o with the normal, and are linear between six values of it: 0, 0.2, ... 1.

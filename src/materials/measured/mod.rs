@@ -12,7 +12,7 @@ use super::ggx::{Frame, ggx_normal, ggx_pdf};
 use super::lobes::{Lobes, Pair, arrival};
 use super::scattered::{MARGIN, gains_energy};
 use super::{Bsdf, BsdfSample, BsdfValue, Form, Member, MemberValue, Surface, Value};
-use crate::reference::core::sampling::cosine_direction;
+use crate::sampling::directions::cosine_direction;
 
 mod cases;
 mod fit;
@@ -26,7 +26,7 @@ pub use table::{BrdfTable, directions};
 
 pub(super) const NAME: &str = "measured";
 
-/// Where the material's table begins in the kernel's texture of all tables: the scene's to say (`gpu/measured.rs`).
+/// Where the material's table begins in the kernel's texture of all tables: the scene's to say (`records/measured.rs`).
 pub const START: Member = Member::word("measured_start");
 
 pub(super) const FORMS: &[Form] = &[Form {

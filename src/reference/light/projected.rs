@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use glam::{DVec2, DVec3};
 
 use super::aim::Aim;
-use crate::reference::core::sampling::basis_around;
+use crate::sampling::directions::basis_around;
 
 /// Area of the segment of the unit disc with half angle h, for p = (cos h, sin h), h in [0, pi].
 #[must_use]

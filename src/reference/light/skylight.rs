@@ -4,7 +4,7 @@ use glam::{DVec2, DVec3};
 
 use super::sphere::LightSample;
 use crate::placement::sky::{Band, SkyTable};
-use crate::reference::core::sampling::circle_point;
+use crate::sampling::directions::circle_point;
 use crate::scene::Sky;
 
 /// With lamps beside the image: how often a vertex looks for the image.

@@ -7,8 +7,8 @@ use glam::{DVec2, DVec3};
 use super::aim::{Aim, aim_at, cone_height};
 use super::projected::{cap_seen, sample_cap};
 use crate::placement::{Light, Lights, Placement};
-use crate::reference::core::sampling::cap_direction;
 use crate::reference::scene::ray::Vertex;
+use crate::sampling::directions::cap_direction;
 use crate::settings::LightSampling;
 
 /// The light that the alias table gives; `None` if there is none.

@@ -5,7 +5,7 @@ use glam::{DVec2, DVec3};
 use super::priority::Media;
 use super::ray::Ray;
 use crate::placement::PlacedCamera;
-use crate::reference::core::sampling::circle_point;
+use crate::sampling::directions::circle_point;
 
 /// The ray through the place `u[0..2]` of a pixel and `u[2..4]` of the lens, in `media`, in the middle of the time for
 /// which the shutter is open.

@@ -5,14 +5,12 @@ use std::f64::consts::TAU;
 
 use glam::{DVec2, DVec3};
 
-use crate::materials::MaterialKind;
 use crate::materials::lattice::LatticePoint;
+use crate::materials::material::parameter;
 use crate::materials::mix::Weight;
 use crate::materials::texturable::EMISSION;
-use crate::reference::core::random::mix_bits;
-use crate::scene::Material;
-use crate::scene::material::parameter;
-use crate::scene::texture::{Texture, TextureImage};
+use crate::materials::{Material, MaterialKind, Texture, TextureImage};
+use crate::sampling::random::mix_bits;
 
 /// Where on its sphere a point is.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -3,11 +3,11 @@
 use std::ops::Range;
 use std::path::Path;
 
+use super::super::Sphere;
 use super::super::file::{ParticlesTable, RadiusValue};
 use super::super::report::{Problem, Report};
-use super::super::{Material, Sphere};
 use super::{Cloud, Coloring, Fault, Map, RadiusBy, Request, Similarity};
-use crate::materials::{self, diffuse};
+use crate::materials::{self, Material, diffuse};
 use crate::particles::Format;
 
 /// What the table asks for, in its first frame unless it names one; `None` after errors, which the report then

@@ -9,7 +9,7 @@ use crate::error::Result;
 use crate::gpu::bsdf_probe::{BsdfInput, Sampled};
 use crate::materials::dielectric::fresnel;
 use crate::materials::{Event, Surface};
-use crate::reference::core::sampling::basis_around;
+use crate::sampling::directions::basis_around;
 use crate::statistics::{mean_and_error, normal_p};
 use crate::verify::{Cells, Outcome, Random, ULP};
 

@@ -15,10 +15,10 @@ use glam::DVec3;
 use crate::error::Result;
 use crate::gpu::bsdf_probe::{BsdfInput, BsdfProbe, Evaluated, Sampled};
 use crate::gpu::device::Gpu;
-use crate::materials::Value;
 use crate::materials::dielectric::fresnel;
-use crate::materials::{ALL, BsdfSample, BsdfValue, MaterialKind, Surface, sample_uniform};
-use crate::scene::{Material, Texture};
+use crate::materials::{
+    ALL, BsdfSample, BsdfValue, Material, MaterialKind, Surface, Texture, Value, sample_uniform,
+};
 use crate::settings::Integrator;
 use crate::verify::{Random, ULP};
 

@@ -1,4 +1,4 @@
-//! Twin of `shaders/core/sobol.wesl`: the same bits. Sources are cited there.
+//! Twin of `shaders/sampler/sobol.wesl`: the same bits. Sources are cited there.
 
 use super::random::{mix_bits, unit_float};
 

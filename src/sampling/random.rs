@@ -40,7 +40,7 @@ pub fn random_words(key: [u32; 2], dimension: u32) -> [u32; 4] {
     })
 }
 
-/// Four numbers of a sample; `dimension` counts dimensions by fours ([`super::super::purpose`]).
+/// Four numbers of a sample; `dimension` counts dimensions by fours ([`super::purpose`]).
 #[must_use]
 pub fn random4(key: [u32; 2], dimension: u32) -> [f64; 4] {
     unit_float(random_words(key, dimension))

@@ -5,10 +5,8 @@
 //! [`reference/cells`](crate::reference::cells) and `shaders/cache/`.
 
 pub mod chart;
-pub(crate) mod obstacle;
 
 pub use chart::Chart;
-pub use obstacle::obstacle;
 
 /// Most cells that have values: 16 bytes each for every batch of a window.
 pub const MOST_CELLS: usize = 1 << 14;

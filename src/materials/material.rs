@@ -1,12 +1,12 @@
-//! Materials of a scene: how they scatter light, what they emit, and which of their values are textures.
+//! A material as a scene has it: how it scatters light, what it emits, and which of its values are textures.
 
 use std::collections::BTreeMap;
 
 use glam::DVec3;
 
+use super::texturable::{EMISSION, ROUGHNESS, WEIGHT};
 use super::texture::{Texture, Textured};
-use crate::materials::texturable::{EMISSION, ROUGHNESS, WEIGHT};
-use crate::materials::{Form, MaterialKind, Texturable, Value};
+use super::{Form, MaterialKind, Texturable, Value, diffuse};
 
 /// A named material.
 #[derive(Clone, Debug, PartialEq)]
@@ -54,6 +54,12 @@ impl Material {
         self.textures.retain(|textured| textured.key != key);
         self.textures.push(Textured { key, texture });
         self
+    }
+
+    /// Whether all that its surface does is to reflect by Lambert's law, with a light of its own or not.
+    #[must_use]
+    pub fn is_diffuse(&self) -> bool {
+        self.kind.form().name == diffuse::NAME
     }
 
     /// The texture of a key.

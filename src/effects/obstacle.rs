@@ -2,8 +2,8 @@
 
 use glam::DVec3;
 
-use crate::materials::diffuse;
-use crate::placement::{PlacedSphere, Placement, Side};
+use crate::materials::Material;
+use crate::placement::{Placement, Side};
 use crate::sampler::Sampler;
 use crate::scene::{Environment, Scene};
 use crate::settings::{DEFAULT_MAX_BOUNCES, GeometryChoice, Integrator, Offset, Settings};
@@ -13,15 +13,13 @@ const MOST_SPHERES: usize = 64;
 /// Most bounces: a pilot's sample then fits what drivers let an invocation do, whatever spheres there are.
 const MOST_BOUNCES: u32 = 128;
 
-/// Whether all that a sphere does is to reflect by Lambert's law, with a light of its own or not.
-pub(crate) fn is_diffuse(scene: &Scene, sphere: &PlacedSphere) -> bool {
-    let material = &scene.materials[sphere.material];
-    material.kind.form().name == diffuse::NAME
-}
-
 /// Why a render has no radiance cache; `None` where it can have one.
 #[must_use]
-pub fn obstacle(scene: &Scene, placement: &Placement, settings: &Settings) -> Option<&'static str> {
+pub fn cache_obstacle(
+    scene: &Scene,
+    placement: &Placement,
+    settings: &Settings,
+) -> Option<&'static str> {
     let kinds = || {
         let spheres = placement.spheres.iter();
         spheres.map(|sphere| &scene.materials[sphere.material])
@@ -79,10 +77,7 @@ pub fn obstacle(scene: &Scene, placement: &Placement, settings: &Settings) -> Op
             placement.spheres.iter().any(|s| s.container.is_some()),
             "surfaces just within a dielectric",
         ),
-        (
-            !placement.spheres.iter().any(|s| is_diffuse(scene, s)),
-            "no sphere is diffuse",
-        ),
+        (!kinds().any(Material::is_diffuse), "no sphere is diffuse"),
         (
             placement.lights.table.is_empty() && !has_sky,
             "there is no lamp, nor an image around all",

@@ -2,14 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use crate::gpu::layout::{MaterialRecord, anchored_spheres};
-use crate::gpu::measured::MeasuredTables;
-use crate::gpu::textures::{PartNumbers, TextureTable};
-use crate::materials::Member;
 use crate::materials::measured::START;
+use crate::materials::{Material, Member};
 use crate::placement::{PlacedSphere, Placement};
-use crate::scene::{Material, Scene};
-use crate::shader::Kernel;
+use crate::records::material::{MaterialRecord, anchored_spheres};
+use crate::records::measured::MeasuredTables;
+use crate::records::textures::{PartNumbers, TextureTable};
+use crate::scene::Scene;
 
 /// A part of a mix.
 #[derive(Clone, Debug)]
@@ -112,14 +111,18 @@ impl MixTable {
         &self.weights
     }
 
-    /// The bytes of all parts, `members` being those of the kernel's `Material` with their places, and that struct's size.
+    /// The bytes of all parts: `own` are the members of the kernel's `MixPart` with their places, and `members` those of
+    /// its `Material`, each with that struct's size.
     #[must_use]
-    pub fn bytes(&self, kernel: &Kernel, (members, size): (&[(Member, u32)], u32)) -> Vec<u8> {
-        let (own, whole) = kernel.struct_members("MixPart").unwrap_or_default();
+    pub fn bytes(
+        &self,
+        (own, whole): (&[(String, u32)], u32),
+        (members, size): (&[(Member, u32)], u32),
+    ) -> Vec<u8> {
         let mut bytes = Vec::with_capacity(self.parts.len() * whole as usize);
         for part in &self.parts {
             let mut record = vec![0; whole as usize];
-            for (name, offset) in &own {
+            for (name, offset) in own {
                 let value = match name.as_str() {
                     "material" => part.material.bytes(members, size),
                     "weight" => part.weight.to_ne_bytes().into(),

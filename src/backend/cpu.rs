@@ -1,17 +1,17 @@
-//! Renders windows on the CPU, path by path.
+//! Renders windows on the CPU by the reference, path by path.
 
 use std::ops::Range;
 
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::cells::Cache;
-use super::path::{PathResult, PathTracer};
-use crate::cells::Cells;
 use crate::error::{Error, Result};
 use crate::film::{AovSums, BLOCK, NonFinite, PixelSums, Tally, Tiles, Window};
 use crate::job::Job;
 use crate::placement::Placement;
+use crate::placement::cells::Cells;
+use crate::reference::cells::Cache;
+use crate::reference::path::{PathResult, PathTracer};
 use crate::render::{Control, Renderer};
 use crate::sampler::Sampler;
 use crate::scene::Scene;

@@ -6,12 +6,13 @@ use std::sync::Arc;
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 
-use crate::gpu::layout::anchored_spheres;
 use crate::image::Picture;
 use crate::materials::lattice::LatticePoint;
 use crate::materials::texturable::EMISSION;
+use crate::materials::{Material, Texture, TextureImage, Textured};
 use crate::placement::Placement;
-use crate::scene::{Material, Scene, Texture, TextureImage, Textured};
+use crate::records::material::{Numbers, anchored_spheres};
+use crate::scene::Scene;
 
 /// Columns of the texture `image_texels` of `shaders/scene/texture.wesl`.
 pub const IMAGE_WIDTH: u32 = 4096;
@@ -45,9 +46,6 @@ pub struct ImageRecord {
     pub scale: f32,
     pub unused: [u32; 3],
 }
-
-/// The numbers by which the kernel knows the textures of some keys.
-pub type Numbers = Vec<(&'static str, u32)>;
 
 /// Those of a part of a mix.
 #[derive(Clone, Debug, Default)]

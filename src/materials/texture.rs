@@ -6,9 +6,9 @@ use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
 
+use super::Texturable;
+use super::schema::along;
 use crate::image::Picture;
-use crate::materials::Texturable;
-use crate::materials::schema::along;
 
 /// A texture, for the value of a key. Numbers are grey.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,13 +1,14 @@
 //! All that a kernel's records of materials refer to by numbers.
 
-use crate::gpu::layout::MaterialRecord;
-use crate::gpu::measured::MeasuredTables;
-use crate::gpu::mix::MixTable;
-use crate::gpu::textures::{Numbers, TextureTable};
+use crate::materials::Material;
 use crate::materials::measured::START;
 use crate::materials::mix::PARTS;
 use crate::placement::Placement;
-use crate::scene::{Material, Scene};
+use crate::records::material::{MaterialRecord, Numbers};
+use crate::records::measured::MeasuredTables;
+use crate::records::mix::MixTable;
+use crate::records::textures::TextureTable;
+use crate::scene::Scene;
 
 /// Textures, tables of measured materials and parts of mixes.
 #[derive(Clone, Debug)]

@@ -1,6 +1,0 @@
-//! Twins of `shaders/core/`.
-
-pub mod random;
-pub mod sampling;
-pub mod sobol;
-pub mod spectrum;
