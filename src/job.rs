@@ -5,7 +5,7 @@
 //! [backend](crate::backend).
 
 use crate::claims::Claims;
-use crate::effects::{BAKED_MOST, Effect, Effects, cache_obstacle};
+use crate::effects::{BAKED_MOST, Effect, Effects, cache_obstacle, conflict};
 use crate::error::{Error, Result};
 use crate::film::PILOT_SAMPLES;
 use crate::placement::cells::Cells;
@@ -120,14 +120,20 @@ impl Job {
 
     /// The same with effects in the kernel that nothing asks for, to measure what they cost; `why` is the reason
     /// given for them.
-    #[must_use]
-    pub fn with_effects(mut self, more: &[Effect], why: &str) -> Self {
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if they cannot be in one kernel with those that are there, or lack what they need.
+    pub fn with_effects(mut self, more: &[Effect], why: &str) -> Result<Self> {
+        let used: Vec<Effect> = self.effects.used().collect();
+        if let Some(conflict) = conflict(&used, more) {
+            return Err(Error::Usage(conflict));
+        }
         self.effects = self.effects.with(more, why);
         if self.effects.has(Effect::RadianceCache) && self.cells().is_none() {
             let none = Cells::none(self.placement.spheres.len());
             self.placement = self.placement.with_cells(none);
         }
-        self
+        Ok(self)
     }
 }
 

@@ -47,6 +47,7 @@ pub mod input;
 pub mod job;
 pub mod ledger;
 pub mod materials;
+pub mod memory;
 pub mod numbers;
 mod numpy;
 pub mod output;

@@ -10,10 +10,10 @@ use crate::common::{scene, scene_file};
 use gpu_trace::error::Error;
 use gpu_trace::image::Picture;
 use gpu_trace::job::prepare;
-use gpu_trace::materials::MaterialKind;
 use gpu_trace::materials::measured::{BrdfTable, Measured};
 use gpu_trace::materials::texturable::texturable_key;
-use gpu_trace::scene::{Environment, Gradient, Material, Scene, Sky, Texture, TextureImage};
+use gpu_trace::materials::{Material, MaterialKind, Texture, TextureImage};
+use gpu_trace::scene::{Environment, Gradient, Scene, Sky};
 use gpu_trace::settings::{GeometryChoice, Integrator, LightSampling, Offset, Rect, Settings};
 use gpu_trace::verify::settings;
 

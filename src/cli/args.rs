@@ -10,8 +10,8 @@ use glam::DVec3;
 use super::choices::{self, Caching, Estimator, Wanted};
 use super::fault::Fault;
 use super::values;
-use crate::backend::{BackendChoice, BackendKind};
-use crate::choice::{Candidate, Choice, choose};
+use crate::backend::BackendChoice;
+use crate::choice::{Choice, Open, choose};
 use crate::error::{Error, Result};
 use crate::output::{Aov, ProgressMode};
 use crate::sampler::Sampler;
@@ -409,15 +409,11 @@ impl RenderArgs {
     /// Those of [`settings`](Self::settings).
     pub(super) fn decide(&self, scene: &Scene) -> Result<(Settings, Option<Choice>)> {
         let settings = self.settings_but_integrator(scene)?;
-        let mut rivals = Vec::new();
-        // Who says how lights are sampled wants them to be sampled, and the radiance cache is that of `path`.
-        let is_path = self.light_sampling.is_some() || settings.radiance_cache;
-        if self.integrator == Estimator::Auto && !is_path {
-            rivals.push(Candidate::Bsdf);
-        }
-        if self.radiance_cache == Some(Caching::Auto) && settings.integrator == Integrator::Path {
-            rivals.push(Candidate::RadianceCache);
-        }
+        let open = Open {
+            integrator: self.integrator == Estimator::Auto,
+            radiance_cache: self.radiance_cache == Some(Caching::Auto),
+        };
+        let rivals = open.rivals(&settings);
         if rivals.is_empty() {
             return Ok((settings, None));
         }
@@ -476,11 +472,6 @@ impl RenderArgs {
                 "--termination is the lecture's: add --integrator lecture".into(),
             ));
         }
-        if self.backend == Wanted::Only(BackendKind::Cpu) && self.device.is_some() {
-            return Err(Error::Usage(
-                "--device chooses a GPU, --backend cpu uses none".into(),
-            ));
-        }
-        Ok(())
+        self.backend_choice().check()
     }
 }

@@ -165,10 +165,7 @@ fn environment<'a>(asked: &Asked<'a>) -> Option<&'a Environment> {
 
 /// Whether vertices look for light.
 fn looks_for_light(asked: &Asked<'_>) -> bool {
-    matches!(
-        asked.settings.integrator,
-        Integrator::Path | Integrator::Nee
-    )
+    asked.settings.integrator.samples_lights()
 }
 
 /// Whether they look for lamps.

@@ -12,6 +12,7 @@ mod light;
 mod obstacle;
 mod paths;
 mod role;
+mod rules;
 mod samples;
 mod surfaces;
 mod textures;
@@ -28,6 +29,7 @@ use crate::settings::Settings;
 pub use geometry::{BAKED_LIMIT, BAKED_MOST};
 pub use obstacle::cache_obstacle;
 pub use role::Role;
+pub use rules::{completed, conflict};
 
 /// An effect: something that a kernel can have or not.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]

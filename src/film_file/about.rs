@@ -8,6 +8,7 @@ use serde_json::Value;
 
 use super::scene::SceneRecord;
 use crate::backend::BackendKind;
+use crate::error::{self, Error};
 use crate::film::Counts;
 use crate::output::stats::Device;
 use crate::render::StoppedBy;
@@ -19,6 +20,19 @@ pub const FORMAT: u32 = 1;
 
 /// No render takes longer, in seconds: some thousand years.
 const MOST_SECONDS: f64 = 1e11;
+
+/// Refuses settings whose film no file keeps.
+///
+/// # Errors
+/// [`Error::Usage`] for a view.
+pub fn check(settings: &Settings) -> error::Result<()> {
+    settings.view.map_or(Ok(()), |view| {
+        Err(Error::Usage(format!(
+            "--checkpoint keeps light, and --view {} is none",
+            view.name()
+        )))
+    })
+}
 
 /// All that a film file says beside its arrays. The names are those of the JSON, which users' scripts rely
 /// on: add members, but rename and remove none.
@@ -196,15 +210,18 @@ impl Goal {
 
 impl Choices {
     /// Those of settings.
-    #[must_use]
-    pub fn of(settings: &Settings) -> Self {
+    ///
+    /// # Errors
+    /// Those of [`check`].
+    pub fn of(settings: &Settings) -> error::Result<Self> {
+        check(settings)?;
         let Rect {
             x,
             y,
             width,
             height,
         } = settings.crop;
-        Self {
+        Ok(Self {
             size: [settings.width, settings.height],
             crop: [x, y, width, height],
             seed: settings.seed,
@@ -223,7 +240,7 @@ impl Choices {
             classes: settings.classes,
             features: settings.features,
             geometry: settings.geometry.name().into(),
-        }
+        })
     }
 
     /// The pixels.

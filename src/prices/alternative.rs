@@ -40,7 +40,9 @@ pub fn alternative(job: &Job, effect: Effect) -> Told<Alternative> {
     Ok(Alternative {
         what: what.to_owned(),
         job: match keeps {
-            true => other.with_effects(&[Effect::Adaptive], "--adaptive"),
+            true => other
+                .with_effects(&[Effect::Adaptive], "--adaptive")
+                .map_err(|error| error.to_string())?,
             false => other,
         },
     })

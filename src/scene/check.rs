@@ -8,18 +8,19 @@ use serde_json::Value as Schema;
 
 use super::environment::{Environment, Gradient, Sky};
 use super::file::schema;
-use super::material::parameter;
 use super::motion::Fault;
 use super::range::{Limits, show};
-use super::texture::{Texture, TextureImage, Textured};
 use super::view::{self, SHORTEST};
-use super::{Camera, MAX_SIDE, Material, Scene, Sphere};
+use super::{Camera, MAX_SIDE, Scene, Sphere};
 use crate::error::{Error, Result};
 use crate::image::Picture;
+use crate::materials::material::parameter;
 use crate::materials::mix::Weight;
 use crate::materials::schema::MAX_MAGNITUDE;
 use crate::materials::texturable::{EMISSION, WEIGHT, texturable_key};
-use crate::materials::{MaterialKind, Mistake, Texturable, Value};
+use crate::materials::{
+    Material, MaterialKind, Mistake, Texturable, Texture, Textured, Value,
+};
 
 /// What is wrong, in words.
 type Fine<T = ()> = std::result::Result<T, String>;
@@ -276,7 +277,7 @@ fn of_texture(key: &Texturable, schema: &Schema, texture: &Texture) -> Fine {
             number("`octaves`", &of_patterns["octaves"], (*octaves).into())
         }
         Texture::Image(image) => {
-            picture(image.image(), TextureImage::is_sound(image))?;
+            picture(image.image(), image.is_sound())?;
             match image.axis().is_normalized() {
                 true => Ok(()),
                 false => Err(format!("the axis of the image {name} has no direction")),
