@@ -49,6 +49,7 @@ mod material_keys;
 mod materials;
 mod measured;
 mod mix;
+mod modules;
 mod motion;
 mod naive;
 mod output;

@@ -15,8 +15,9 @@ use crate::choice::{Choice, Open, choose};
 use crate::error::{Error, Result};
 use crate::output::{Aov, ProgressMode};
 use crate::sampler::Sampler;
+use crate::scene::color_map::Map;
 use crate::scene::particles::look::Look;
-use crate::scene::particles::{Frames, Map};
+use crate::scene::trajectory::Frames;
 use crate::scene::{Loaded, MAX_BOUNCES, Scene, builtin};
 use crate::settings::{
     DEFAULT_TERMINATION, GeometryChoice, Integrator, LightSampling, MAXIMUM_SPP, Offset, Rect,

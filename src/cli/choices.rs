@@ -5,7 +5,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
 use crate::backend::BackendKind;
 use crate::sampler::Sampler;
-use crate::scene::particles::Map;
+use crate::scene::color_map::Map;
 use crate::settings::{GeometryChoice, Integrator, LightSampling, View};
 
 /// Lets `value_enum` take the names of a type's `ALL`.

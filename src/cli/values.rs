@@ -6,7 +6,7 @@ use std::time::Duration;
 use glam::DVec3;
 
 use crate::materials::schema::MAX_MAGNITUDE;
-use crate::scene::particles::Frames;
+use crate::scene::trajectory::Frames;
 use crate::scene::{MAX_SIDE, MAX_SPP};
 use crate::settings::{Rect, TERMINATIONS};
 

@@ -6,10 +6,9 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Action, Error, Result};
-use crate::scene::file_hash;
 use crate::scene::load::{Loaded, Source, load_str_in};
-use crate::scene::particles::direct;
 use crate::scene::particles::look::Look;
+use crate::scene::{direct, file_hash};
 
 /// What a scene was made from. The text of a scene file is an entry of its own.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

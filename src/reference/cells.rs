@@ -4,9 +4,10 @@
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::path::{Path, PathResult, PathTracer};
+use super::path::PathTracer;
 use super::scene::ray::{Hit, Ray, vertex_at};
 use super::scene::sphere::closest_hit;
+use super::state::{Begin, Cache, Path, PathResult};
 use crate::placement::PlacedSphere;
 use crate::placement::cells::chart::ChartPoint;
 use crate::placement::cells::{Cell, Cells};
@@ -17,46 +18,6 @@ use crate::settings::pilot_words;
 
 /// The probability with which a value is corrected.
 const CORRECTED: f64 = 0.25;
-
-/// The radiance cache for one batch of samples.
-#[derive(Clone, Copy, Debug)]
-pub struct Cache<'a> {
-    /// Which cells there are.
-    pub cells: &'a Cells,
-    /// The mean of the radiance that each of those in use reflects, W/(sr m²).
-    pub values: &'a [DVec3],
-}
-
-/// Where a part of a path begins.
-pub(super) struct Begin {
-    ray: Ray,
-    throughput: DVec3,
-    bounces: u32,
-    sphere: usize,
-}
-
-impl Path {
-    /// Whether another part of the path is left: it goes on there.
-    pub(super) fn go_back(&mut self) -> bool {
-        let Some(begin) = self.other.take() else {
-            return false;
-        };
-        self.ray = begin.ray;
-        self.throughput = begin.throughput;
-        self.found.bounces = begin.bounces;
-        self.begin_on(begin.sphere);
-        true
-    }
-
-    /// Lets it arrive on this sphere without a ray.
-    fn begin_on(&mut self, index: usize) {
-        self.arrives_at = Some(Some(Hit {
-            t: 0.0,
-            index,
-            inside: false,
-        }));
-    }
-}
 
 /// A ray that arrives at a point of `sphere`, where a path begins.
 fn begin_at(arrived: &Ray, point: &ChartPoint, sphere: &PlacedSphere) -> Ray {

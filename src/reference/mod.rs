@@ -9,4 +9,5 @@ pub mod cells;
 pub mod light;
 pub mod path;
 pub mod scene;
+pub mod state;
 pub mod survey;

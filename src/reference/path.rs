@@ -2,7 +2,6 @@
 
 use glam::DVec3;
 
-use super::cells::{Begin, Cache};
 use super::light::aim::aim_at;
 use super::light::environment::{environment_radiance, sky_place};
 use super::light::skylight::{NO_SPHERE, SKY_SHARE, sample_sky, sky_density};
@@ -13,7 +12,8 @@ use super::scene::priority::{Media, cross_surface, filling, index_within, relati
 use super::scene::ray::{Hit, Ray, Vertex, leave, vertex_at};
 use super::scene::sphere::closest_hit;
 use super::scene::texture::{TexturePoint, emission_at, kind_at};
-use crate::film::{AovSums, LightClass};
+use super::state::{Cache, Departure, Path, PathResult};
+use crate::film::LightClass;
 use crate::materials::{BsdfSample, Event, MaterialKind, Surface, sample_uniform};
 use crate::placement::{Medium, Placement, SkyTable};
 use crate::sampler::Sampler;
@@ -46,79 +46,6 @@ fn index_at(kind: &MaterialKind, wavelength: Option<f64>) -> f64 {
     match (kind.dispersion(), wavelength) {
         (Some(index), Some(wavelength)) => index.at(wavelength),
         _ => kind.ior(),
-    }
-}
-
-/// What one path found.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct PathResult {
-    /// W/(sr m²) per channel.
-    pub radiance: DVec3,
-    /// Rays traced.
-    pub rays: u32,
-    /// Those of them that look for a light.
-    pub shadow_rays: u32,
-    /// Vertices at which a direction to a light was drawn.
-    pub connections: u32,
-    /// Cells of the radiance cache that were asked for their values.
-    pub lookups: u32,
-    /// Scattering events.
-    pub bounces: u32,
-    /// Throughput with which the bounce limit cut the path; zero if it did not.
-    pub cut: DVec3,
-    /// Its share of what was asked for beside the image.
-    pub aovs: AovSums,
-}
-
-/// A path on its way.
-pub(super) struct Path {
-    pub(super) ray: Ray,
-    pub(super) throughput: DVec3,
-    /// Product of the index ratios squared of the refractions so far.
-    pub(super) eta_scale: f64,
-    /// That it keeps, in nm.
-    wavelength: Option<f64>,
-    departure: Departure,
-    pub(super) class: LightClass,
-    pub(super) found: PathResult,
-    /// Whether it asks no cell of the radiance cache: it is a pilot's, or corrects a value.
-    pub(super) plain: bool,
-    /// What its ray hits, where that is known.
-    pub(super) arrives_at: Option<Option<Hit>>,
-    /// What is left to do when it has ended.
-    pub(super) other: Option<Begin>,
-}
-
-/// What light sampling has left of the path's way to go on from a vertex.
-#[derive(Clone, Copy, Debug, Default)]
-struct Departure {
-    /// With which the BSDF found the direction; 0: light sampling could not have found it.
-    pdf: f64,
-    /// See [`light_pdf`].
-    pdf_per_weight: f64,
-}
-
-impl Path {
-    /// One that starts with a ray, at this time.
-    pub(super) fn new(ray: Ray, time: f64) -> Self {
-        Self {
-            ray: Ray { time, ..ray },
-            throughput: DVec3::ONE,
-            eta_scale: 1.0,
-            wavelength: None,
-            departure: Departure::default(),
-            class: LightClass::Emission,
-            found: PathResult::default(),
-            plain: false,
-            arrives_at: None,
-            other: None,
-        }
-    }
-
-    pub(super) fn receive(&mut self, class: LightClass, radiance: DVec3) {
-        self.found.radiance += radiance;
-        let sum = &mut self.found.aovs.classes[class as usize];
-        *sum = (DVec3::from(*sum) + radiance).to_array();
     }
 }
 

@@ -2,8 +2,8 @@
 
 use std::path::{MAIN_SEPARATOR, Path};
 
+use super::direct;
 use super::load::{Loaded, load_file_at, load_str};
-use super::particles::direct;
 use super::particles::look::Look;
 use super::suggest::nearest;
 use crate::error::{Error, Result};

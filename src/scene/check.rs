@@ -6,7 +6,7 @@
 use glam::DVec3;
 use serde_json::Value as Schema;
 
-use super::environment::{Environment, Gradient, Sky};
+use super::environment::{Environment, Gradient};
 use super::file::schema;
 use super::motion::Fault;
 use super::range::{Limits, show};
@@ -16,7 +16,6 @@ use crate::error::{Error, Result};
 use crate::image::Picture;
 use crate::materials::material::parameter;
 use crate::materials::mix::Weight;
-use crate::materials::schema::MAX_MAGNITUDE;
 use crate::materials::texturable::{EMISSION, WEIGHT, texturable_key};
 use crate::materials::{
     Material, MaterialKind, Mistake, Texturable, Texture, Textured, Value,
@@ -131,20 +130,9 @@ fn environment(environment: &Environment) -> Fine {
             vector("`scale`", &keys["scale"], sky.scale())?;
             number("`rotation`", &keys["rotation"], sky.rotation())?;
             picture(sky.image(), sky.is_sound())?;
-            sky_limit(sky).map_err(|fault| format!("image: {fault}"))
+            sky.check_brightest().map_err(|fault| format!("image: {fault}"))
         }
     }
-}
-
-/// Refuses a sky that is too bright.
-pub(super) fn sky_limit(sky: &Sky) -> Fine {
-    let brightest = sky.brightest();
-    if brightest <= MAX_MAGNITUDE {
-        return Ok(());
-    }
-    Err(format!(
-        "its brightest value times `scale` is {brightest:e}, more than {MAX_MAGNITUDE:e}, the limit of a radiance"
-    ))
 }
 
 /// An image that is looked up. Whether its texels are finite and not negative is known from when it was made.

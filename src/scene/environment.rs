@@ -8,13 +8,13 @@ use std::sync::Arc;
 use glam::DVec3;
 use toml::Spanned;
 
-use super::check::sky_limit;
 use super::file::{EnvironmentTable, GradientTable, ScaleValue};
 use super::image;
 use super::report::{Problem, Report};
 use super::suggest::list;
-use super::validate::vector;
+use super::vector::vector;
 use crate::image::Picture;
+use crate::materials::schema::MAX_MAGNITUDE;
 
 /// Light from everywhere.
 #[derive(Clone, Debug, PartialEq)]
@@ -79,6 +79,17 @@ impl Sky {
     #[must_use]
     pub fn brightest(&self) -> f64 {
         self.brightest
+    }
+
+    /// Refuses one that is too bright.
+    pub(super) fn check_brightest(&self) -> Result<(), String> {
+        if self.brightest <= MAX_MAGNITUDE {
+            return Ok(());
+        }
+        Err(format!(
+            "its brightest value times `scale` is {:e}, more than {MAX_MAGNITUDE:e}, the limit of a radiance",
+            self.brightest
+        ))
     }
 
     /// What messages call it: its file, as the scene names it.
@@ -273,7 +284,7 @@ fn sky(
     };
     files.push(path);
     let sky = Sky::new(image.get_ref(), texels, scale, rotation);
-    if let Err(text) = sky_limit(&sky) {
+    if let Err(text) = sky.check_brightest() {
         wrong(text, Some("a smaller `scale` brings it below"));
         return None;
     }

@@ -19,7 +19,7 @@ use toml::Spanned;
 use crate::materials::schema::{MAX_MAGNITUDE, axis, radiance, texture, vector};
 use crate::materials::{self, MaterialKind, diffuse, schemas};
 use crate::particles::Format;
-use crate::scene::particles::Map;
+use crate::scene::color_map::Map;
 
 /// The largest width and height of an image, in pixels.
 pub const MAX_SIDE: u32 = 65_536;

@@ -12,9 +12,10 @@ use serde::Deserialize;
 use toml::de::{DeTable, Deserializer};
 
 use super::file::{SceneFile, schema};
+use super::parsed::{Parsed, Place};
 use super::particles::look::Look;
 use super::report::{Problem, Report};
-use super::{Scene, content_hash, pieces, shape, texture_table, validate};
+use super::{Scene, content_hash, names, pieces, shape, texture_table, validate};
 use crate::error::{Action, Error, Result};
 
 /// The largest scene file that is read, in bytes; about three million spheres.
@@ -123,24 +124,6 @@ pub fn load_str_in(name: &str, text: &str, folder: &Path) -> Result<Loaded> {
     load(name.to_owned(), name, text, place, None)
 }
 
-/// Where and when the files of a scene are looked at.
-#[derive(Clone, Copy)]
-pub(super) struct Place<'a> {
-    /// The folder from which they are named.
-    pub(super) folder: &'a Path,
-    /// The frame of those that name none and have several.
-    pub(super) frame: Option<u64>,
-}
-
-/// What a scene file holds.
-pub(super) struct Parsed {
-    pub(super) scene: Scene,
-    /// See [`Loaded::files`].
-    pub(super) files: Vec<PathBuf>,
-    /// See [`Loaded::frames`].
-    pub(super) frames: Option<u64>,
-}
-
 fn read(path: &Path) -> io::Result<Vec<u8>> {
     if fs::metadata(path)?.is_dir() {
         return Err(io::ErrorKind::IsADirectory.into());
@@ -236,7 +219,7 @@ fn parse(text: &str, place: Place<'_>, report: &mut Report) -> Option<Parsed> {
     if !report.errors.is_empty() {
         return None;
     }
-    let keys = validate::material_keys(root.get_ref());
+    let keys = names::material_keys(root.get_ref());
     let textures = texture_table::take(root.get_mut());
     let file = SceneFile::deserialize(Deserializer::from(root))
         .map_err(|error| report.errors.push(syntax(&error)));

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::named;
+use super::names::MaterialKeys;
 use super::report::{Problem, Report};
-use super::validate::MaterialKeys;
 use crate::materials::measured::{BrdfTable, MERL_BYTES, parse};
 use crate::materials::{Material, MaterialKind};
 

@@ -5,8 +5,8 @@ use std::ops::Range;
 
 use glam::DVec3;
 
+use super::names::{MaterialKeys, unknown_material};
 use super::report::{Problem, Report};
-use super::validate::{MaterialKeys, unknown_material};
 use crate::materials::mix::{Factor, MOST_PARTS, Part, Weight};
 use crate::materials::texturable::{EMISSION, WEIGHT};
 use crate::materials::{Material, MaterialKind};

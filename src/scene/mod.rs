@@ -7,7 +7,9 @@
 
 pub mod builtin;
 mod check;
+pub mod color_map;
 mod describe;
+pub mod direct;
 pub mod environment;
 mod file;
 mod hash;
@@ -17,6 +19,8 @@ mod measured;
 mod mix;
 pub mod motion;
 mod named;
+mod names;
+mod parsed;
 pub mod particles;
 mod pieces;
 #[cfg(test)]
@@ -26,7 +30,9 @@ mod report;
 mod shape;
 mod suggest;
 mod texture_table;
+pub mod trajectory;
 mod validate;
+mod vector;
 mod view;
 
 pub use describe::summary;

@@ -13,10 +13,10 @@ use toml::Spanned;
 use toml::de::{DeTable, Deserializer};
 
 use super::file::{SceneFile, SphereTable};
+use super::names::{MaterialKeys, material_keys};
 use super::report::Report;
 use super::shape;
 use super::texture_table::{self, Textures};
-use super::validate::{MaterialKeys, material_keys};
 
 /// Before each sphere.
 const HEADER: &str = "[[sphere]]";

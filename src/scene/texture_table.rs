@@ -14,7 +14,7 @@ use super::file::ScaleValue;
 use super::image;
 use super::report::{Problem, Report};
 use super::suggest::list;
-use super::validate::vector;
+use super::vector::vector;
 use crate::image::Picture;
 use crate::materials::schema::{axis_mistake, up};
 use crate::materials::texturable::texturable;

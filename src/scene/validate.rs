@@ -5,40 +5,20 @@ use std::ops::Range;
 
 use glam::DVec3;
 use toml::Spanned;
-use toml::de::DeTable;
 
 use super::check::{TINY, all_tiny, no_priority, tiny_help};
 use super::file::{CameraTable, HandednessName, MaterialTable, SceneFile, SphereTable};
-use super::load::{Parsed, Place};
 use super::motion::{check_motion, shutter};
-use super::particles;
+use super::names::{MaterialKeys, unknown_material};
+use super::parsed::{Parsed, Place};
 use super::report::{Problem, Report, SHOWN};
-use super::suggest::{list, nearest};
 use super::texture_table::{self, Textures};
+use super::vector::vector;
 use super::view::{Fault, SHORTEST};
 use super::{
-    Camera, Handedness, Material, RenderDefaults, Scene, Sphere, environment, measured, mix,
+    Camera, Handedness, RenderDefaults, Scene, Sphere, environment, measured, mix, particles,
 };
-use crate::materials::Mistake;
-
-/// At most so many material names are listed in a message.
-const NAMES_LISTED: usize = 12;
-
-/// Where each key of each material is.
-pub(super) type MaterialKeys = HashMap<(String, String), Range<usize>>;
-
-/// Where each key of each material of a file is.
-pub(super) fn material_keys(root: &DeTable<'_>) -> MaterialKeys {
-    let materials = root.get("material").and_then(|m| m.get_ref().as_table());
-    let mut keys = HashMap::new();
-    for (name, material) in materials.into_iter().flatten() {
-        for (key, _) in material.get_ref().as_table().into_iter().flatten() {
-            let place = (name.get_ref().to_string(), key.get_ref().to_string());
-            keys.insert(place, key.span());
-        }
-    }
-    keys
-}
+use crate::materials::{Material, Mistake};
 
 /// What a file holds whose files are at that place; `None` after errors, which the report then holds.
 pub(super) fn scene(
@@ -315,34 +295,11 @@ fn of_use(vector: DVec3) -> DVec3 {
     }
 }
 
-/// The vector, without negative zeros: the two zeros are equal and must hash alike.
-pub(super) fn vector(values: [f64; 3]) -> DVec3 {
-    DVec3::from_array(values) + 0.0
-}
-
 fn material(name: String, table: MaterialTable) -> Material {
     Material {
         emission: table.emission + 0.0,
         ..Material::new(&name, table.kind)
     }
-}
-
-pub(super) fn unknown_material(name: &str, materials: &[Material]) -> Problem {
-    let names = || materials.iter().map(|material| material.name.as_str());
-    let label =
-        nearest(name, names()).map_or_else(String::new, |near| format!("did you mean \"{near}\"?"));
-    let message = format!("unknown material \"{}\"", name.escape_debug());
-    let more = materials.len().saturating_sub(NAMES_LISTED);
-    let help = match (materials.len(), more) {
-        (0, _) => format!("no material is defined; add a table `[material.{name}]`"),
-        (1, _) => format!("the only material here is {}", list(names(), "")),
-        (_, 0) => format!("the materials here are {}", list(names(), "and")),
-        _ => format!(
-            "the materials here are {} and {more} more",
-            names().take(NAMES_LISTED).collect::<Vec<_>>().join(", ")
-        ),
-    };
-    Problem::new(0..0, message, label).help(help)
 }
 
 fn warn(scene: &Scene, spans: &[Range<usize>], used: &BTreeSet<usize>, report: &mut Report) {

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::bsdf::dispatch;
+use super::dispatch::dispatch;
 use crate::materials::{Form, mix};
 
 /// What the functions import; `deltas`: whether a part has delta lobes.

@@ -5,6 +5,7 @@
 mod baked;
 mod binding;
 mod bsdf;
+mod dispatch;
 mod mixes;
 mod names;
 mod sources;

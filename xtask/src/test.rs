@@ -34,7 +34,7 @@ const LONG_FORMS: &str = "GPU_TRACE_TEST_ALL";
 ///
 /// The files of `tests/` that one driver answers for all: those that open no GPU; those of files, options,
 /// processes and studies, to which a GPU is one like another; those of light transport.
-const ONCE: [&str; 37] = [
+const ONCE: [&str; 38] = [
     "albedo_variance",
     "car_paint",
     "choice",
@@ -62,6 +62,7 @@ const ONCE: [&str; 37] = [
     "material_keys",
     "measured",
     "mix",
+    "modules",
     "naive",
     "output",
     "particles",

@@ -9,7 +9,7 @@ use super::session::Session;
 use crate::cli::args::RenderArgs;
 use crate::error::{Error, Result};
 use crate::output::{Target, check_all};
-use crate::scene::particles::{Frames, Trajectory};
+use crate::scene::trajectory::{Frames, Trajectory};
 
 /// Renders the frames, one after the other.
 pub(super) fn run(args: &RenderArgs, frames: Frames) -> Result<()> {

@@ -3,7 +3,8 @@
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use super::{Coloring, Map};
+use super::Coloring;
+use crate::scene::color_map::Map;
 
 /// How the file is shown.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -1,20 +1,17 @@
 //! Particles of a file as spheres: which of them, where, how large and of which colour.
 
 mod color;
-pub mod direct;
 pub mod look;
 mod select;
 mod table;
-mod trajectory;
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use glam::{DMat3, DVec3};
 
-pub use color::{Coloring, Map};
-pub(super) use table::{add, flickering, problem, request};
-pub use trajectory::{Frames, Trajectory};
+pub use color::Coloring;
+pub(super) use table::{add, colored, flickering, problem, request};
 
 use crate::materials::schema::MAX_MAGNITUDE;
 use crate::particles::{Element, Format, Particles, ReadError, frames, read};

@@ -4,9 +4,10 @@ use std::ops::Range;
 use std::path::Path;
 
 use super::super::Sphere;
+use super::super::color_map::Map;
 use super::super::file::{ParticlesTable, RadiusValue};
 use super::super::report::{Problem, Report};
-use super::{Cloud, Coloring, Fault, Map, RadiusBy, Request, Similarity};
+use super::{Cloud, Coloring, Fault, RadiusBy, Request, Similarity};
 use crate::materials::{self, Material, diffuse};
 use crate::particles::Format;
 

@@ -1,6 +1,7 @@
 use glam::DVec3;
 
-use super::{Coloring, Fault, Map, RadiusBy, Request, Similarity, gather};
+use super::{Coloring, Fault, RadiusBy, Request, Similarity, gather};
+use crate::scene::color_map::Map;
 use crate::scene::load::load_file;
 
 const XYZ: &str = "4\nProperties=species:S:1:pos:R:3:pe:R:1\n\

@@ -5,14 +5,15 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use super::look::Look;
-use super::table::colored;
-use super::{Ball, Cloud, Coloring, Fault, RadiusBy, Request, Similarity, gather};
+use super::load::{Loaded, Source};
+use super::particles::look::Look;
+use super::particles::{
+    Ball, Cloud, Coloring, Fault, RadiusBy, Request, Similarity, colored, gather,
+};
+use super::{Camera, Environment, Handedness, RenderDefaults, Scene, Sphere, content_hash};
 use crate::error::{Error, Result};
 use crate::materials::Material;
 use crate::materials::diffuse::{self, Diffuse};
-use crate::scene::load::{Loaded, Source};
-use crate::scene::{Camera, Environment, Handedness, RenderDefaults, Scene, Sphere, content_hash};
 
 /// Size of the picture, in pixels.
 const SIZE: [u32; 2] = [960, 720];

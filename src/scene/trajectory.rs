@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
+use super::builtin;
 use super::direct::Movie;
-use super::look::Look;
+use super::load::Loaded;
+use super::particles::look::Look;
 use crate::error::{Error, Result};
 use crate::particles::Format;
-use crate::scene::builtin;
-use crate::scene::load::Loaded;
 
 /// Which frames: those from `first` on, each `step`-th, before `end`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
