@@ -38,7 +38,10 @@ fn every() -> impl DoubleEndedIterator<Item = Effect> + Clone {
 /// `None` if that cannot be.
 fn completed(set: impl IntoIterator<Item = Effect>) -> Option<Set> {
     let mut set: Set = set.into_iter().collect();
-    if [Effect::Nested, Effect::Straddle].iter().any(|e| set.contains(e)) {
+    if [Effect::Nested, Effect::Straddle]
+        .iter()
+        .any(|e| set.contains(e))
+    {
         set.insert(Effect::Form(0));
     }
     effects::completed(set)

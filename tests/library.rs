@@ -129,10 +129,7 @@ fn effects_are_forced_only_with_what_they_need() {
     let job = job(&scene, &bsdf);
     let with = |more: &[Effect]| job.clone().with_effects(more, "forced");
     refused(with(&[Effect::Mis]), "mis needs lights or skylight");
-    refused(
-        with(&[Effect::Bvh]),
-        "bvh and baked are not in one kernel",
-    );
+    refused(with(&[Effect::Bvh]), "bvh and baked are not in one kernel");
     // Excluded by what is there.
     refused(
         with(&[Effect::Lecture]),

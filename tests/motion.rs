@@ -153,7 +153,7 @@ fn a_moving_lamp_is_the_mean_of_its_frames() {
         }
         let settings = Settings {
             integrator,
-            light_sampling,
+            light_sampling: integrator.samples_lights().then_some(light_sampling),
             ..base.clone()
         };
         check_frames(&scene, &settings);

@@ -17,9 +17,7 @@ use crate::image::Picture;
 use crate::materials::material::parameter;
 use crate::materials::mix::Weight;
 use crate::materials::texturable::{EMISSION, WEIGHT, texturable_key};
-use crate::materials::{
-    Material, MaterialKind, Mistake, Texturable, Texture, Textured, Value,
-};
+use crate::materials::{Material, MaterialKind, Mistake, Texturable, Texture, Textured, Value};
 
 /// What is wrong, in words.
 type Fine<T = ()> = std::result::Result<T, String>;
@@ -130,7 +128,8 @@ fn environment(environment: &Environment) -> Fine {
             vector("`scale`", &keys["scale"], sky.scale())?;
             number("`rotation`", &keys["rotation"], sky.rotation())?;
             picture(sky.image(), sky.is_sound())?;
-            sky.check_brightest().map_err(|fault| format!("image: {fault}"))
+            sky.check_brightest()
+                .map_err(|fault| format!("image: {fault}"))
         }
     }
 }

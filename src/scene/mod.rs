@@ -43,6 +43,8 @@ pub use load::Loaded;
 
 use glam::DVec3;
 
+use crate::materials::Material;
+
 /// A scene: read by the loader (`scene::load`), from the gallery (`scene::builtin`), or made in code;
 /// [`check`](Self::check) says whether it can be one.
 #[derive(Clone, Debug, PartialEq)]

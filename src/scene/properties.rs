@@ -8,12 +8,12 @@ use proptest::prelude::*;
 use super::load::load_str;
 use super::view::SHORTEST;
 use super::{
-    Camera, Environment, Gradient, Handedness, MAX_BOUNCES, MAX_SIDE, MAX_SPP, Material,
-    RenderDefaults, Scene, Sphere,
+    Camera, Environment, Gradient, Handedness, MAX_BOUNCES, MAX_SIDE, MAX_SPP, RenderDefaults,
+    Scene, Sphere,
 };
 use crate::error::Error;
 use crate::materials::schema::MAX_MAGNITUDE;
-use crate::materials::{ALL, MaterialKind, Value};
+use crate::materials::{ALL, Material, MaterialKind, Value};
 
 fn vector(v: DVec3) -> String {
     format!("[{:?}, {:?}, {:?}]", v.x, v.y, v.z)

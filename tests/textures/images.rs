@@ -183,7 +183,7 @@ fn brightness(scene: &Scene, integrator: Integrator, light_sampling: LightSampli
     let each = (0..8).map(|seed| {
         let settings = Settings {
             integrator,
-            light_sampling,
+            light_sampling: integrator.samples_lights().then_some(light_sampling),
             seed,
             ..settings(scene, 16, 16, 256)
         };

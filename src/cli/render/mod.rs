@@ -26,7 +26,9 @@ use crate::film_file;
 use crate::image::Picture;
 use crate::job::{Job, prepare};
 use crate::memory::{LEAST_PIXEL_BYTES, check_memory};
-use crate::output::{Contents, Layer, Plane, Stats, Target, atomic, check_all, check_layers, write_all};
+use crate::output::{
+    Contents, Layer, Plane, Stats, Target, atomic, check_all, check_layers, write_all,
+};
 use crate::render::Outcome;
 use crate::scene::load::Loaded;
 

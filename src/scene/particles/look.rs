@@ -39,7 +39,7 @@ impl Look {
         }
     }
 
-    pub(super) fn coloring(&self) -> Option<Coloring> {
+    pub(in crate::scene) fn coloring(&self) -> Option<Coloring> {
         Some(match self.color_by.as_deref()? {
             "element" => Coloring::Element,
             name => Coloring::Column {
