@@ -2,7 +2,6 @@
 
 use super::surfaces::forms_that;
 use super::{Effect, Row, cache_obstacle, when};
-use crate::materials::diffuse;
 
 pub(super) fn rows() -> Vec<Row> {
     vec![
@@ -42,7 +41,7 @@ pub(super) fn rows() -> Vec<Row> {
         )
         .needs([Effect::Sobol])
         .needs([Effect::Mis])
-        .needs(diffuse())
+        .needs(forms_that(|form| form.lambertian))
         .excludes([
             Effect::Lecture,
             Effect::Bvh,
@@ -79,9 +78,4 @@ pub(super) fn rows() -> Vec<Row> {
             "CELLS_WIDTH",
         ]),
     ]
-}
-
-/// The form of diffuse surfaces.
-fn diffuse() -> Vec<Effect> {
-    forms_that(|form| form.name == diffuse::NAME)
 }

@@ -7,9 +7,7 @@ use crate::effects::{BAKED_MOST, Effect};
 use crate::job::{Job, prepare};
 use crate::materials::mix::Weight;
 use crate::materials::texturable::{EMISSION, WEIGHT, texturable_key, textured_keys};
-use crate::materials::{
-    Material, MaterialKind, Texture, Textured, dielectric::Dielectric, diffuse::Diffuse, forms,
-};
+use crate::materials::{Material, MaterialKind, Texture, Textured, diffuse::Diffuse, forms};
 use crate::sampler::Sampler;
 use crate::scene::Scene;
 use crate::settings::{GeometryChoice, Integrator, LightSampling, Offset, Settings};
@@ -104,7 +102,7 @@ fn change(
         Effect::Adaptive => "all tiles alike",
         Effect::Form(code) => {
             let form = forms()[code as usize];
-            if job.effects().has(effect) && form.name == crate::materials::diffuse::NAME {
+            if job.effects().has(effect) && form.lambertian {
                 return Err("it is what other materials are measured against".into());
             }
             replace(scene, |kind| {
@@ -120,17 +118,11 @@ fn change(
             "diffuse of its colour"
         }
         Effect::Absorption => {
-            replace(scene, |kind| match kind {
-                MaterialKind::Dielectric(glass) => Some(clear(glass).into()),
-                _ => None,
-            });
+            replace(scene, |kind| kind.clear());
             "clear glass"
         }
         Effect::Dispersion => {
-            replace(scene, |kind| match kind {
-                MaterialKind::Dielectric(glass) => Some(of_one_index(glass, kind.ior()).into()),
-                _ => None,
-            });
+            replace(scene, |kind| kind.of_one_index());
             "the index of yellow light for all"
         }
         Effect::TextureChecker => {
@@ -232,21 +224,4 @@ fn keep_textures(scene: &mut Scene, is_kept: impl Fn(&str, &Texture) -> bool) {
             }
         }
     });
-}
-
-/// The same glass without absorption.
-fn clear(glass: &Dielectric) -> Dielectric {
-    Dielectric {
-        absorption: DVec3::ZERO,
-        ..glass.clone()
-    }
-}
-
-/// The same glass with one index for all wavelengths.
-fn of_one_index(glass: &Dielectric, ior: f64) -> Dielectric {
-    Dielectric {
-        absorption: glass.absorption,
-        roughness: glass.roughness,
-        ..Dielectric::smooth(ior)
-    }
 }
