@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::light::aim::aim_at;
 use super::light::environment::{environment_radiance, sky_place};
-use super::light::skylight::{NO_SPHERE, SKY_SHARE, sample_sky, sky_density};
+use super::light::skylight::{NO_SPHERE, SKY_SHARE, sample_sky, sky_pdf};
 use super::light::sphere::{LightSample, light_pdf, mis_weight, sample_light};
 use super::scene::absorption::transmittance;
 use super::scene::camera::camera_ray;
@@ -348,7 +348,7 @@ impl PathTracer<'_> {
             None => 1.0,
             Some((sky, table)) => {
                 let share = if self.samples_lamps() { SKY_SHARE } else { 1.0 };
-                let other = share * sky_density(sky, table, sky_place(sky, w));
+                let other = share * sky_pdf(sky, table, sky_place(sky, w));
                 self.share_of_hit(from.pdf, other)
             }
         }
