@@ -1,6 +1,7 @@
 //! `gpu-trace compare`: figures known by hand or from others' code, and what they lead to.
 
 use crate::cli_support::{Folder, holds};
+use crate::common::images::mean;
 use gpu_trace::compare::{HeatMap, Options, Report, Seen, compare, flip, heat_colour, ssim};
 use gpu_trace::image::{Picture, linear};
 use gpu_trace::input::{Input, decode};
@@ -149,10 +150,6 @@ fn seen(pixels: &[[f64; 3]]) -> Seen {
         width: 40,
         pixels: pixels.iter().map(|p| p.map(linear)).collect(),
     }
-}
-
-fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len() as f64
 }
 
 /// Of the authors' own code, in f32 (`references/perception.py`).
