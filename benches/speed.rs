@@ -94,7 +94,10 @@ fn ours(
     if !with.is_empty() {
         let effect =
             |name: &&str| Effect::named(name).unwrap_or_else(|| panic!("no effect {name}"));
-        job = job.with_effects(&with.iter().map(effect).collect::<Vec<_>>(), "forced");
+        let with: Vec<Effect> = with.iter().map(effect).collect();
+        job = job
+            .with_effects(&with, "forced")
+            .unwrap_or_else(|e| panic!("{e}"));
     }
     let gpu = device::open(&DeviceChoice::Best).unwrap_or_else(|e| panic!("{e}"));
     let mut renderer = GpuRenderer::new(gpu, &job).unwrap_or_else(|e| panic!("{e}"));

@@ -64,6 +64,33 @@ impl Candidate {
     }
 }
 
+/// What is left to the scene.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Open {
+    /// Whether lights are sampled.
+    pub integrator: bool,
+    /// Whether there is a radiance cache.
+    pub radiance_cache: bool,
+}
+
+impl Open {
+    /// What may be taken in the place of `path`, where `settings` have that for what is left to the scene.
+    #[must_use]
+    pub fn rivals(self, settings: &Settings) -> Vec<Candidate> {
+        // Who says how lights are sampled wants them to be sampled, and the radiance cache is that of `path`.
+        let is_path = settings.light_sampling.is_some() || settings.radiance_cache;
+        let rivals = [
+            (Candidate::Bsdf, self.integrator && !is_path),
+            (
+                Candidate::RadianceCache,
+                self.radiance_cache && settings.integrator == Integrator::Path,
+            ),
+        ];
+        let rivals = rivals.into_iter().filter(|(_, is)| *is);
+        rivals.map(|(candidate, _)| candidate).collect()
+    }
+}
+
 /// Samples a pixel of a pilot: from so many on an error is known.
 const SAMPLES: u64 = LEAST_SAMPLES;
 

@@ -12,7 +12,7 @@ pub enum Error {
     /// place underlined, under a heading of its own.
     #[error("{0}")]
     Scene(String),
-    /// A scene that is well formed, but that the kernel cannot hold.
+    /// A scene that was made in code as no file could hold it, or that the kernel cannot hold.
     #[error("{0}")]
     Placement(String),
     /// An option or a combination of options that cannot be used.

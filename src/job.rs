@@ -5,14 +5,13 @@
 //! [backend](crate::backend).
 
 use crate::claims::Claims;
-use crate::effects::{BAKED_MOST, Effect, Effects, cache_obstacle};
+use crate::effects::{BAKED_MOST, Effect, Effects, cache_obstacle, conflict};
 use crate::error::{Error, Result};
 use crate::film::PILOT_SAMPLES;
 use crate::placement::cells::Cells;
 use crate::placement::media::MAX_LEVELS;
 use crate::placement::{Placement, Side};
 use crate::reference::survey::survey;
-use crate::scene::motion::Fault;
 use crate::scene::{MAX_BOUNCES, MAX_SIDE, MAX_SPP, Scene};
 use crate::settings::{GeometryChoice, Integrator, Offset, Settings, TERMINATIONS, View};
 use crate::shader::steps::paths_at_most;
@@ -33,13 +32,13 @@ pub struct Job {
 ///
 /// # Errors
 /// [`Error::Usage`] where settings are out of range or contradict each other or the scene;
-/// [`Error::Placement`] for a scene that the kernel cannot render in this way.
+/// [`Error::Placement`] for a scene that no scene file could hold, or that the kernel cannot render in this way.
 pub fn prepare(scene: &Scene, settings: &Settings) -> Result<Job> {
+    scene.check()?;
     check_image(settings)?;
     check_samples(settings)?;
     check_transport(settings)?;
     check_geometry(scene, settings)?;
-    check_motion(scene)?;
     let placement = Placement::with_offset(scene, settings.width, settings.height, settings.offset);
     check_levels(&placement)?;
     check_magnitudes(scene, &placement)?;
@@ -138,14 +137,20 @@ impl Job {
 
     /// The same with effects in the kernel that nothing asks for, to measure what they cost; `why` is the reason
     /// given for them.
-    #[must_use]
-    pub fn with_effects(mut self, more: &[Effect], why: &str) -> Self {
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if they cannot be in one kernel with those that are there, or lack what they need.
+    pub fn with_effects(mut self, more: &[Effect], why: &str) -> Result<Self> {
+        let used: Vec<Effect> = self.effects.used().collect();
+        if let Some(conflict) = conflict(&used, more) {
+            return Err(Error::Usage(conflict));
+        }
         self.effects = self.effects.with(more, why);
         if self.effects.has(Effect::RadianceCache) && self.cells().is_none() {
             let none = Cells::none(self.placement.spheres.len());
             self.placement = self.placement.with_cells(none);
         }
-        self
+        Ok(self)
     }
 }
 
@@ -200,6 +205,9 @@ fn check_samples(settings: &Settings) -> Result<()> {
     if settings.error.is_some_and(|e| !(e.is_finite() && e > 0.0)) {
         return usage("--error: an error to reach is above 0".into());
     }
+    if settings.time.is_some_and(|time| time.is_zero()) {
+        return usage("--time: no time at all".into());
+    }
     Ok(())
 }
 
@@ -216,6 +224,18 @@ fn check_transport(settings: &Settings) -> Result<()> {
         return usage(format!(
             "--termination {termination}: a probability from 0 to below 1"
         ));
+    }
+    let integrator = settings.integrator;
+    if settings.light_sampling.is_some() && !integrator.samples_lights() {
+        return usage(format!(
+            "--light-sampling says how path and nee sample lights: --integrator {} does not",
+            integrator.name()
+        ));
+    }
+    if settings.roulette.is_some() && integrator.is_lecture() {
+        return usage(
+            "--integrator lecture has its own roulette: --termination 0 turns it off".into(),
+        );
     }
     if !settings.offset.is_valid() {
         return usage(format!(
@@ -235,16 +255,6 @@ fn check_geometry(scene: &Scene, settings: &Settings) -> Result<()> {
         ));
     }
     Ok(())
-}
-
-/// Refuses spheres that move as they cannot; a scene file is refused before, with their lines.
-fn check_motion(scene: &Scene) -> Result<()> {
-    let faults = (1..).zip(&scene.spheres);
-    let mut faults = faults.filter_map(|(i, sphere)| Some((i, Fault::of(scene, sphere)?)));
-    faults.next().map_or(Ok(()), |(i, fault)| {
-        let (what, help) = (fault.what(), fault.help());
-        Err(Error::Placement(format!("sphere {i} {what}: {help}")))
-    })
 }
 
 /// Refuses views of what is not in the kernel.

@@ -9,7 +9,8 @@
 //! 2. [`sampling`]: random numbers and what is drawn by them. [`sampler`]: which samples are placed together.
 //!    [`materials`]: how surfaces scatter light, and what of it may be a texture.
 //! 3. [`scene`]: the scene file, validated. [`settings`]: how it will be rendered.
-//! 4. [`film`]: f64 sums and variances over all windows; mean and error; where further samples go.
+//! 4. [`film`]: f64 sums and variances over all windows; mean and error; where further samples go. [`memory`]: what
+//!    that takes, asked before it is taken.
 //! 5. [`bvh`]: a tree over many spheres. [`placement`]: where everything is, in f64, relative to where the picture
 //!    is; what lies in what, which of several dielectrics fills the space, what light sampling chooses from.
 //! 6. [`effects`]: what the scene asks for; nothing else goes into the kernel.
@@ -46,6 +47,7 @@ pub mod input;
 pub mod job;
 pub mod ledger;
 pub mod materials;
+pub mod memory;
 pub mod numbers;
 mod numpy;
 pub mod output;

@@ -36,16 +36,17 @@ pub struct Settings {
     pub max_bounces: u32,
     /// The estimator.
     pub integrator: Integrator,
-    /// How a direction to a light is drawn (`path` and `nee`).
-    pub light_sampling: LightSampling,
+    /// How a direction to a light is drawn, of an estimator that [samples lights](Integrator::samples_lights);
+    /// `None`: as it does where nobody says.
+    pub light_sampling: Option<LightSampling>,
     /// How the random numbers of samples are placed.
     pub sampler: Sampler,
     /// Whether diffuse surfaces that paths come to from diffuse ones reflect by values of cells, drawn anew for every
     /// batch of samples and corrected without bias, where nothing [stands against it](crate::effects::cache_obstacle).
     pub radiance_cache: bool,
-    /// Whether paths end by Russian roulette on their throughput. The lecture's estimator has its own, and
-    /// does not ask.
-    pub roulette: bool,
+    /// Whether paths end by Russian roulette on their throughput; `None`: as the estimator has it. The lecture's
+    /// has its own, and no other.
+    pub roulette: Option<bool>,
     /// The form of the geometry in the kernel.
     pub geometry: GeometryChoice,
     /// What the image shows; `None`: light.
@@ -71,6 +72,18 @@ impl Settings {
         self.classes || self.features
     }
 
+    /// Whether paths end by Russian roulette on their throughput.
+    #[must_use]
+    pub fn has_roulette(&self) -> bool {
+        !self.integrator.is_lecture() && self.roulette != Some(false)
+    }
+
+    /// How a direction to a light is drawn where one is.
+    #[must_use]
+    pub fn light_sampling(&self) -> LightSampling {
+        self.light_sampling.unwrap_or_default()
+    }
+
     /// The defaults for `scene`.
     #[must_use]
     pub fn for_scene(scene: &Scene) -> Self {
@@ -82,10 +95,10 @@ impl Settings {
             seed: 0,
             max_bounces: scene.render.max_bounces.unwrap_or(DEFAULT_MAX_BOUNCES),
             integrator: Integrator::Path,
-            light_sampling: LightSampling::default(),
+            light_sampling: None,
             sampler: Sampler::default(),
             radiance_cache: false,
-            roulette: true,
+            roulette: None,
             geometry: GeometryChoice::Auto,
             view: None,
             offset: Offset::Exact,
@@ -184,6 +197,12 @@ impl Integrator {
     #[must_use]
     pub fn is_lecture(self) -> bool {
         matches!(self, Self::Lecture { .. })
+    }
+
+    /// Whether it looks for lights from every vertex.
+    #[must_use]
+    pub fn samples_lights(self) -> bool {
+        matches!(self, Self::Path | Self::Nee)
     }
 
     /// The name on the command line.

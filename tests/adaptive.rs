@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use crate::common::images::{assert_alike, mean};
 use crate::common::{cpu_renderer, gpu_renderer, render_cpu, render_gpu, scene, scene_file};
 use crate::thorough::thorough;
 use gpu_trace::film::{
@@ -170,7 +171,8 @@ fn timing_changes_no_bits() {
     };
     let mut renderer: GpuRenderer = gpu_renderer(&scene, &settings).with_limits(limits);
     let parts = render_quietly(&mut renderer, &settings).unwrap_or_else(|e| panic!("{e}"));
-    assert_eq!(image_bits(&whole), image_bits(&parts.film));
+    let same = image_bits(&whole) == image_bits(&parts.film);
+    assert_alike("adaptive in parts", &parts.film, &whole, same, "other bits");
     let variances = |film: &Film| -> Vec<_> {
         (0..film.rect().pixels())
             .map(|i| film.variance_of_mean(i))
@@ -196,7 +198,9 @@ fn device_and_host_take_the_same_samples() {
         let pixels = a.rect().pixels();
         let alike = |i: &usize| a.allocation().step(*i) == b.allocation().step(*i);
         let same = (0..pixels).filter(alike).count();
-        assert!(10 * same >= 9 * pixels, "{name}: {same} of {pixels} alike");
+        let what = format!("{same} of {pixels} have as many samples");
+        let of_both = format!("adaptive, {name}");
+        assert_alike(&of_both, &a, &b, 10 * same >= 9 * pixels, what);
         assert!(a.most_samples() > a.samples(), "{name}: nothing to compare");
         // The same tiles of both.
         let tiles = a.allocation().tiles(1).expect("several steps");
@@ -226,10 +230,9 @@ fn device_and_host_take_the_same_samples() {
     }
 }
 
-/// The mean over the image of a render.
-fn mean(film: &Film) -> f64 {
-    let pixels = film.rect().pixels();
-    (0..pixels).map(|i| film.mean(i)[1]).sum::<f64>() / pixels as f64
+/// The green of each pixel.
+fn green(film: &Film) -> Vec<f64> {
+    (0..film.rect().pixels()).map(|i| film.mean(i)[1]).collect()
 }
 
 /// The mean over the image if the first 64 samples of each pixel decide whether it gets more, and
@@ -283,7 +286,7 @@ fn nothing_is_too_dark() {
     let variances = (0..reference.rect().pixels())
         .map(|i| reference.variance_of_mean(i).expect("16 batches")[1]);
     let noise = variances.sum::<f64>().sqrt() / reference.rect().pixels() as f64;
-    let truth = mean(&reference);
+    let truth = mean(&green(&reference));
 
     let mut renderer = gpu_renderer(&scene, &adaptive(&scene, width, height, 256));
     let (mut all, mut stopped, mut companion) = (Vec::new(), Vec::new(), Vec::new());
@@ -297,7 +300,7 @@ fn nothing_is_too_dark() {
         renderer = renderer.with_seed(seed);
         let film = run(&mut renderer, &settings);
         assert!(film.most_samples() > film.samples());
-        all.push(mean(&film));
+        all.push(mean(&green(&film)));
         let part = |samples| Settings {
             adaptive: false,
             samples,
@@ -313,7 +316,7 @@ fn nothing_is_too_dark() {
         );
         assert!(Estimate::of(&film).error_at_most <= Some(0.12));
         looks.insert(film.samples());
-        stopped.push(mean(&film));
+        stopped.push(mean(&green(&film)));
         let first = run(&mut renderer, &part(0..64));
         let last = run(&mut renderer, &part(64..256));
         companion.push(careless(&first, &last));

@@ -7,7 +7,8 @@
 
 use std::path::Path;
 
-use crate::common::{job, leave, render_cpu, render_gpu, scene_file, scene_files};
+use crate::common::images::fault;
+use crate::common::{job, render_cpu, render_gpu, scene_file, scene_files};
 use gpu_trace::film::Film;
 use gpu_trace::materials::MaterialKind;
 use gpu_trace::scene::Scene;
@@ -80,10 +81,9 @@ fn check(jobs: impl Iterator<Item = (String, Scene, Settings)>) {
         let reference = render_cpu(&scene, &settings);
         let verdict = Verdict::of(&film, &reference);
         eprintln!("{name}: {verdict:?}");
-        if !verdict.passes() || film.tally().non_finite > 0 {
-            let left = leave(&name, &film, &reference);
-            failed.push(format!("{name}: {verdict:?}, {:?}; {left}", film.tally()));
-        }
+        let holds = verdict.passes() && film.tally().non_finite == 0;
+        let what = format!("{verdict:?}, {:?}", film.tally());
+        failed.extend(fault(&name, &film, &reference, holds, what));
     }
     assert!(failed.is_empty(), "{}", failed.join("\n"));
 }
@@ -154,7 +154,7 @@ fn other_kernels_agree_with_the_reference() {
         };
         let list = Settings {
             geometry: GeometryChoice::List,
-            roulette: false,
+            roulette: Some(false),
             max_bounces: 12,
             ..base
         };

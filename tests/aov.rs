@@ -1,6 +1,7 @@
 //! Layers beside the image: light by the kind of its path, and what is seen first.
 
 use crate::cli_support::{Folder, holds};
+use crate::common::images::assert_alike;
 use crate::common::{gpu_renderer, render_cpu, render_gpu, scene, scene_file};
 use gpu_trace::film::{Film, LightClass};
 use gpu_trace::render::render_quietly;
@@ -18,7 +19,6 @@ const INTEGRATORS: [Integrator; 4] = [
 fn with_aovs(scene: &Scene, integrator: Integrator, spp: u64) -> Settings {
     Settings {
         integrator,
-        roulette: !matches!(integrator, Integrator::Lecture { .. }),
         classes: true,
         features: true,
         ..settings(scene, 24, 18, spp)
@@ -90,7 +90,8 @@ fn the_image_is_the_same_with_and_without() {
         ..with.clone()
     };
     let (with, without) = (render_gpu(&scene, &with), render_gpu(&scene, &without));
-    assert_eq!(with.pixels(), without.pixels());
+    let same = with.pixels() == without.pixels();
+    assert_alike("with layers", &with, &without, same, "other bits");
     assert!(with.aovs(0).is_some() && without.aovs(0).is_none());
 }
 
@@ -240,7 +241,9 @@ fn both_renderers_have_the_same_layers() {
                 .count();
         }
         // A few paths go other ways in f32: of each pixel's 23 numbers hardly one.
-        assert!(apart < gpu.rect().pixels() * 23 / 50, "{apart}");
+        let name = format!("layers, adaptive {adaptive}");
+        let few = apart < gpu.rect().pixels() * 23 / 50;
+        assert_alike(&name, &gpu, &cpu, few, format!("{apart} numbers differ"));
     }
 }
 

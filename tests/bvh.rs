@@ -2,6 +2,7 @@
 //!
 //! `gpu-trace check` has the hits of all crowds, case 40.
 
+use crate::common::images::assert_alike;
 use crate::common::{gpu, gpu_renderer, render_gpu, scene, scene_file, scene_files};
 use glam::{DVec3, Vec3};
 use gpu_trace::bvh::{Ball, MOST_SAH_LEVELS, NOTHING, Options, Tree, WIDTH};
@@ -163,7 +164,7 @@ fn hits(placement: &Placement, form: &str, effects: &[&str], rays: &[RayRows]) -
 }
 
 /// How many differ.
-fn apart(a: &[HitRow], b: &[HitRow]) -> usize {
+fn differing(a: &[HitRow], b: &[HitRow]) -> usize {
     assert_eq!(a.len(), b.len());
     a.iter().zip(b).filter(|(a, b)| a != b).count()
 }
@@ -194,12 +195,15 @@ fn hits_beside_walls_are_those_of_the_list() {
             ray[0][3] = f32::from_bits(own.saturating_add(if own == u32::MAX { 0 } else { 2 }));
         }
         let list = hits(&placement, "list", effects, &rays);
-        assert_eq!(apart(&list, &hits(&placement, "bvh", effects, &rays)), 0);
+        assert_eq!(
+            differing(&list, &hits(&placement, "bvh", effects, &rays)),
+            0
+        );
         // Companion: without the walls.
         let mut less = placement.clone();
         less.spheres.truncate(2);
         less.spheres[0].anchor *= 2.0;
-        assert_ne!(apart(&list, &hits(&less, "bvh", effects, &rays)), 0);
+        assert_ne!(differing(&list, &hits(&less, "bvh", effects, &rays)), 0);
     }
 }
 
@@ -213,7 +217,7 @@ fn companion_smaller_boxes_are_found() {
         let list = hits(&placement, "list", &["diffuse"], &rays);
         let differ = |options| {
             let other = placement.clone().with_tree(tree(&placement, options));
-            apart(&list, &hits(&other, "bvh", &["diffuse"], &rays))
+            differing(&list, &hits(&other, "bvh", &["diffuse"], &rays))
         };
         let smaller = Options {
             scale: 0.99,
@@ -344,7 +348,9 @@ fn every_scene_by_the_tree_is_that_of_the_list() {
         let off = share_off(&tree, &list);
         let same = image_bits(&list) == image_bits(&tree);
         eprintln!("{}: {off}, the same bits: {same}", path.display());
-        assert!(off < 0.02, "{}: {off} of the values differ", path.display());
+        let name = format!("{} by the tree", path.display());
+        let what = format!("{off} of the values differ");
+        assert_alike(&name, &tree, &list, off < 0.02, what);
         // Companion: other samples, but for scenes of one radiance everywhere.
         if i % 4 == 0 {
             noticed += usize::from(share_off(&film(GeometryChoice::Bvh, 1), &list) > 0.02);
@@ -439,11 +445,11 @@ fn glass_hits_from_within_are_those_of_the_list() {
     }
     let list = hits(&placement, "list", &GLASS, &rays);
     let tree = hits(&placement, "bvh", &GLASS, &rays);
-    assert_eq!(apart(&list, &tree), 0);
+    assert_eq!(differing(&list, &tree), 0);
     assert!(list.iter().filter(|hit| hit.inside == 1).count() > 500);
     // Companion: paths that are known to be in none.
     for ray in &mut rays {
         ray[2][3] = f32::from_bits(u32::MAX);
     }
-    assert_ne!(apart(&list, &hits(&placement, "bvh", &GLASS, &rays)), 0);
+    assert_ne!(differing(&list, &hits(&placement, "bvh", &GLASS, &rays)), 0);
 }

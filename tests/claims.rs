@@ -1,6 +1,7 @@
 //! Estimators hold what they claim: every integrator, sampler and light sampling, evenly and adaptively.
 //! Each claim has a judge here, and a companion: where the claim would be wrong, its judge finds it.
 
+use crate::common::images::channels_by_batches;
 use crate::common::{gpu_renderer, job, scene, scene_file};
 use gpu_trace::error::Result;
 use gpu_trace::film::{Film, window_end};
@@ -41,14 +42,14 @@ fn gray() -> Scene {
 fn estimators(scene: &Scene) -> Vec<Settings> {
     let mut all = Vec::new();
     for integrator in Integrator::ALL {
-        let asks = matches!(integrator, Integrator::Path | Integrator::Nee);
+        let asks = integrator.samples_lights();
         let kinds = &LightSampling::ALL[..if asks { 2 } else { 1 }];
         for light_sampling in kinds {
             for sampler in Sampler::ALL {
                 for adaptive in [false, true] {
                     all.push(Settings {
                         integrator: *integrator,
-                        light_sampling: *light_sampling,
+                        light_sampling: asks.then_some(*light_sampling),
                         sampler: *sampler,
                         adaptive,
                         ..settings(scene, 32, 24, SPP)
@@ -69,7 +70,7 @@ fn name(s: &Settings) -> String {
     format!(
         "{} {} {}{}{}",
         s.integrator.name(),
-        s.light_sampling.name(),
+        s.light_sampling().name(),
         s.sampler.name(),
         if s.adaptive { " adaptive" } else { "" },
         if s.radiance_cache { " cache" } else { "" },
@@ -122,18 +123,14 @@ fn excess(films: &[Film], share: f64) -> f64 {
     mean / error
 }
 
-/// The difference of two images' means in standard errors.
-fn apart(a: &[Film], b: &[Film]) -> f64 {
+/// The difference of two images' means in standard errors, each of several films.
+fn mean_apart(a: &[Film], b: &[Film]) -> f64 {
     let total = |films: &[Film]| {
         let n = films.len() as f64;
-        let of_film = |film: &Film| {
-            let pixels = film.rect().pixels();
-            let sum: f64 = (0..pixels).map(|i| film.mean(i)[0]).sum();
-            let variance = film.variance_of_image_mean().expect("16 batches")[0];
-            [sum / pixels as f64, variance]
-        };
-        let all = films.iter().map(of_film);
-        let [sum, variance] = all.fold([0.0; 2], |s, v| [s[0] + v[0], s[1] + v[1]]);
+        let all = films.iter().map(|film| channels_by_batches(film)[0]);
+        let [sum, variance] = all.fold([0.0; 2], |s, [mean, error]| {
+            [s[0] + mean, s[1] + error * error]
+        });
         [sum / n, variance / (n * n)]
     };
     let ([a, va], [b, vb]) = (total(a), total(b));
@@ -209,7 +206,7 @@ fn every_estimator_holds_what_it_claims() {
     let plain = Settings {
         integrator: Integrator::Bsdf,
         sampler: Sampler::Independent,
-        roulette: false,
+        roulette: Some(false),
         seed: 99,
         ..settings(&scene, 32, 24, 8 * SPP)
     };
@@ -223,7 +220,7 @@ fn every_estimator_holds_what_it_claims() {
         let films = films(gpu_renderer(&scene, &settings), &settings);
         // A companion: error bars of half the length.
         let (bars, halved) = (excess(&films, 1.0), excess(&films, 0.25));
-        let apart = apart(&films, &truth);
+        let apart = mean_apart(&films, &truth);
         let agree = splits_agree(&scene, &settings);
         eprintln!(
             "{name}: bars off by {bars:.2}, half of them {halved:.2}, mean by {apart:.2}, splits agree: {agree}"
@@ -265,7 +262,7 @@ fn companion_a_bias_is_found() {
     assert!(job(&scene, &exact).claims().unbiased);
     assert!(!job(&scene, &nudged).claims().unbiased);
     let [exact, nudged] = [exact, nudged].map(|s| films(gpu_renderer(&scene, &s), &s));
-    let apart = apart(&exact, &nudged);
+    let apart = mean_apart(&exact, &nudged);
     assert!(apart.abs() > normal_limit(TESTS), "{apart}");
 }
 

@@ -10,7 +10,7 @@ use std::sync::{Arc, Mutex};
 use crate::common::{scene_file, scene_files};
 use crate::thorough::thorough;
 use glam::{DVec2, DVec3};
-use gpu_trace::effects::{Effect, Effects, table};
+use gpu_trace::effects::{self, Effect, Effects, table};
 use gpu_trace::image::Picture;
 use gpu_trace::materials::texturable::{texturable_key, textured_keys};
 use gpu_trace::materials::{ALL, Material, MaterialKind, Texture, TextureImage, forms};
@@ -34,46 +34,17 @@ fn every() -> impl DoubleEndedIterator<Item = Effect> + Clone {
     table().iter().map(|row| row.effect)
 }
 
-fn excluded(a: Effect, b: Effect) -> bool {
-    a.row().excludes.contains(&b) || b.row().excludes.contains(&a)
-}
-
-fn possible(set: &Set) -> bool {
-    set.iter().all(|a| set.iter().all(|b| !excluded(*a, *b)))
-}
-
-/// `set` with what its effects need: of each list the first that nothing excludes. `None` if there is none.
+/// `set` with what its effects need, and what the scenes here have: something opaque within glass and through a lens.
+/// `None` if that cannot be.
 fn completed(set: impl IntoIterator<Item = Effect>) -> Option<Set> {
     let mut set: Set = set.into_iter().collect();
-    let opaque = Effect::Form(0);
     if [Effect::Nested, Effect::Straddle]
         .iter()
         .any(|e| set.contains(e))
     {
-        // What scenes here have within glass, and through a lens.
-        set.insert(opaque);
+        set.insert(Effect::Form(0));
     }
-    if ![Effect::List, Effect::Bvh, Effect::BvhCost]
-        .iter()
-        .any(|e| set.contains(e))
-    {
-        set.insert(Effect::Baked);
-    }
-    loop {
-        if !possible(&set) {
-            return None;
-        }
-        let lists = set.iter().flat_map(|effect| &effect.row().needs);
-        let Some(missing) = lists
-            .into_iter()
-            .find(|list| !list.iter().any(|effect| set.contains(effect)))
-        else {
-            return Some(set);
-        };
-        let fits = |effect: &&Effect| set.iter().all(|other| !excluded(**effect, *other));
-        let added = *missing.iter().find(fits)?;
-        set.insert(added);
-    }
+    effects::completed(set)
 }
 
 /// `set` without an effect and all that need it.
@@ -308,11 +279,9 @@ fn asking_for(set: &Set) -> (Scene, Settings) {
             [.., true] => Integrator::Nee,
             _ => Integrator::Bsdf,
         },
-        light_sampling: match has(Effect::Lights) && !has(Effect::Projected) {
-            true => LightSampling::Cone,
-            false => LightSampling::Projected,
-        },
-        roulette: has(Effect::Roulette),
+        light_sampling: (has(Effect::Lights) && !has(Effect::Projected))
+            .then_some(LightSampling::Cone),
+        roulette: (!has(Effect::Lecture)).then_some(has(Effect::Roulette)),
         radiance_cache: has(Effect::RadianceCache),
         adaptive: has(Effect::Adaptive),
         classes: has(Effect::Classes),
@@ -594,7 +563,7 @@ fn every_set_in_the_scenes() {
             match variant {
                 1 => settings.geometry = GeometryChoice::List,
                 2 => settings.integrator = Integrator::Lecture { termination: 0.2 },
-                3 => settings.roulette = false,
+                3 => settings.roulette = Some(false),
                 4 => settings.geometry = GeometryChoice::Bvh,
                 _ => {}
             }

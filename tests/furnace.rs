@@ -1,5 +1,6 @@
 //! Scenes whose image is one number, known exactly.
 
+use crate::common::images::assert_uniform;
 use crate::common::{render_gpu, scene, scene_file};
 use gpu_trace::film::Film;
 use gpu_trace::scene::Scene;
@@ -40,17 +41,16 @@ const RADII: [f64; 7] = [1.0e-6, 1.0e-3, 0.1, 1.0, 7.0, 1.0e3, 1.0e6];
 fn check_closed(albedo: f64, radius: f64, bounces: u32) {
     let scene = closed(albedo, radius);
     let settings = Settings {
-        roulette: false,
+        roulette: Some(false),
         max_bounces: bounces,
         ..settings(&scene, 16, 16, 16)
     };
     let film = render_gpu(&scene, &settings);
     let (expected, tolerance) = furnace(albedo, bounces);
     let off = deviation(&film, expected);
-    assert!(
-        off <= tolerance,
-        "albedo {albedo}, radius {radius}, {bounces} bounces: off by {off:e}, {tolerance:e} allowed"
-    );
+    let name = format!("albedo {albedo}, radius {radius}, {bounces} bounces");
+    let what = format!("off by {off:e}, {tolerance:e} allowed");
+    assert_uniform(&name, &film, expected, off <= tolerance, what);
     // 16 samples of 1 + bounces rays each: no path misses.
     let rays = 256 * 16 * u64::from(bounces + 1);
     assert_eq!(film.tally().rays, rays, "radius {radius}");
@@ -167,7 +167,7 @@ fn companion_a_wrong_furnace_is_found() {
     let run = |albedo: f64, bounces: u32| {
         let scene = closed(albedo, 1.0);
         let settings = Settings {
-            roulette: false,
+            roulette: Some(false),
             max_bounces: bounces,
             ..settings(&scene, 16, 16, 16)
         };
@@ -204,10 +204,9 @@ fn a_white_furnace_is_white() {
             let off = deviation(&film, 1.0);
             // numerics.md, case 26, asks for 1e-3. A path takes a few events, each with the
             // roundings of two divisions by the index squared: 16 u an event, 64 at most.
-            assert!(
-                off <= 64.0 * 16.0 * U,
-                "{name}, radius {radius}: off by {off:e}"
-            );
+            let name = format!("{name}, radius {radius}");
+            let what = format!("off by {off:e}");
+            assert_uniform(&name, &film, 1.0, off <= 64.0 * 16.0 * U, what);
         }
     }
 }
@@ -255,11 +254,12 @@ fn radiance_in_glass_is_larger_by_the_index_squared() {
         render_gpu(&scene, &settings(&scene, 32, 32, 64))
     };
     let tolerance = 64.0 * 16.0 * U;
-    let off = deviation(&image(4.0, 2.25), 1.0);
-    assert!(off <= tolerance, "from outside: off by {off:e}");
-    // Too near to the centre for total reflection.
-    let off = deviation(&image(0.3, 2.25), 2.25);
-    assert!(off <= tolerance, "from inside: off by {off:e}");
+    // From within too near to the centre for total reflection.
+    for (name, camera, expected) in [("from outside", 4.0, 1.0), ("from inside", 0.3, 2.25)] {
+        let film = image(camera, 2.25);
+        let off = deviation(&film, expected);
+        assert_uniform(name, &film, expected, off <= tolerance, off);
+    }
     // Companions: without the square it shows.
     assert!(deviation(&image(4.0, 1.0), 1.0) > 0.1);
     assert!(deviation(&image(0.3, 1.0), 2.25) > 0.1);

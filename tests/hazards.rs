@@ -4,7 +4,8 @@
 
 use std::fmt::Write as _;
 
-use crate::common::{leave, render_cpu, render_gpu, scene};
+use crate::common::images::assert_alike;
+use crate::common::{render_cpu, render_gpu, scene};
 use gpu_trace::film::Film;
 use gpu_trace::scene::Scene;
 use gpu_trace::settings::{Offset, Settings};
@@ -49,11 +50,15 @@ fn trouble(film: &Film, reference: &Film) -> Option<String> {
     None
 }
 
+fn assert_no_trouble(name: &str, film: &Film, reference: &Film) {
+    let trouble = trouble(film, reference);
+    let what = trouble.as_deref().unwrap_or_default();
+    assert_alike(name, film, reference, trouble.is_none(), what);
+}
+
 fn check(name: &str, scene: &Scene, settings: &Settings) {
     let (film, reference) = (render_gpu(scene, settings), exact(scene, settings));
-    if let Some(what) = trouble(&film, &reference) {
-        panic!("{name}: {what}; {}", leave(name, &film, &reference));
-    }
+    assert_no_trouble(name, &film, &reference);
 }
 
 /// The reference, which always leaves surfaces exactly.
@@ -183,10 +188,7 @@ fn a_moved_scene_is_the_same() {
     };
     for d in [1.0, 1.0e3, 1.0e5, f64::from(1 << 26)] {
         let moved = render_gpu(&at(d), &settings);
-        if let Some(what) = trouble(&moved, &film) {
-            let left = leave(&format!("moved by {d}"), &moved, &film);
-            panic!("moved by {d}: {what}; {left}");
-        }
+        assert_no_trouble(&format!("moved by {d}"), &moved, &film);
     }
     // Companion: moved without the camera.
     let mut other = at(1.0e-2);

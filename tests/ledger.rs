@@ -34,7 +34,7 @@ fn a_bounce_limit_takes_the_rest_of_the_series() {
             let scene = furnace(albedo);
             let settings = Settings {
                 max_bounces: bounces,
-                roulette: false,
+                roulette: Some(false),
                 integrator: Integrator::Bsdf,
                 ..settings(&scene, 32, 32, 16)
             };

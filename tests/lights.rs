@@ -3,6 +3,7 @@
 
 use std::f64::consts::TAU;
 
+use crate::common::images::{assert_alike, bias};
 use crate::common::{probe, render_cpu, render_gpu, scene};
 use crate::thorough::thorough;
 use gpu_trace::film::Film;
@@ -12,8 +13,8 @@ use gpu_trace::reference::light::aim::{aim_center, cone_height};
 use gpu_trace::reference::light::sphere::mis_weight;
 use gpu_trace::scene::{Scene, Sphere};
 use gpu_trace::settings::{Integrator, LightSampling, Settings};
-use gpu_trace::statistics::{chi_square, mean_and_error, sidak};
-use gpu_trace::verify::{Random, ULP, means, settings, to_row, vector};
+use gpu_trace::statistics::{chi_square, sidak};
+use gpu_trace::verify::{Random, ULP, settings, share_off, to_row, vector};
 
 const LIGHTS: [&str; 5] = ["baked", "emission", "lights", "table", "mis"];
 
@@ -80,8 +81,8 @@ fn cone_directions_are_uniform() {
             let angle = d.dot(other).atan2(d.dot(across)) / TAU + 0.5;
             let cell = |x: f64| ((16.0 * x) as usize).min(15);
             counts[16 * cell(x) + cell(angle)] += 1;
-            let density = 1.0 / (TAU * height);
-            assert!((f64::from(output[3]) / density - 1.0).abs() < 1.0e-4);
+            let pdf = 1.0 / (TAU * height);
+            assert!((f64::from(output[3]) / pdf - 1.0).abs() < 1.0e-4);
         }
         p_values.push(chi_square(&counts, &[1.0 / 256.0; 256]).p);
         // Companion: 20 % more in one row of cells.
@@ -148,22 +149,6 @@ fn rendered(scene: &Scene, integrator: Integrator, spp: u64) -> Film {
     render_gpu(scene, &settings)
 }
 
-/// Deviations by which the means of two independent films differ, and their relative difference.
-fn apart(a: &Film, b: &Film, scale: f64) -> (f64, f64) {
-    let mean = |film: &Film| mean_and_error(&means(film)).0;
-    let variance = |film: &Film| -> f64 {
-        let pixels = 0..film.rect().pixels();
-        // The channels of a pixel go together: their deviations add.
-        let all = pixels.map(|i| film.variance_of_mean(i).expect("blocks"));
-        let sum: f64 = all
-            .map(|v| v.iter().map(|v| v.sqrt()).sum::<f64>().powi(2))
-            .sum();
-        sum / (3.0 * film.rect().pixels() as f64).powi(2)
-    };
-    let (x, y) = (scale * mean(a), mean(b));
-    ((x - y) / (variance(a) + variance(b)).sqrt(), x / y - 1.0)
-}
-
 /// Integrators with light sampling, and both ways to do it.
 const SAMPLED: [(Integrator, LightSampling); 4] = [
     (Integrator::Path, LightSampling::Projected),
@@ -179,7 +164,7 @@ fn sampled(
 ) -> Film {
     let settings = Settings {
         integrator,
-        light_sampling,
+        light_sampling: Some(light_sampling),
         ..settings(scene, 24, 18, spp)
     };
     render_gpu(scene, &settings)
@@ -196,11 +181,13 @@ fn all_estimators_converge_to_the_same() {
         );
         for how in SAMPLED {
             let film = sampled(&scene, how, 1 << 13);
-            let (z, bias) = apart(&film, &reference, 1.0);
-            eprintln!("{how:?}: z = {z:.2}, bias {bias:.2e}");
-            assert!(z.abs() < 3.9, "{how:?}: {z} deviations, {bias:e}");
+            let name = format!("lamps, {how:?}");
+            let (z, by) = bias(&film, &reference, 1.0);
+            eprintln!("{name}: z = {z:.2}, bias {by:.2e}");
+            let what = format!("{z} deviations, {by:e}");
+            assert_alike(&name, &film, &reference, z.abs() < 3.9, what);
             // Companion: 4 % too dark. The reference has fireflies: its error is 0.7 %, in the long form 0.5 %.
-            let (z, _) = apart(&film, &reference, 0.96);
+            let (z, _) = bias(&film, &reference, 0.96);
             assert!(z.abs() > 3.9, "4 % is not found: {z}");
         }
     }
@@ -275,11 +262,13 @@ fn check_sampled(name: &str, scene: &Scene, references: &[Film], spp: u64) {
     for how in SAMPLED {
         let film = sampled(scene, how, spp);
         for reference in references {
-            let (z, bias) = apart(&film, reference, 1.0);
-            eprintln!("{name}, {how:?}: z = {z:.2}, bias {bias:.2e}");
-            assert!(z.abs() < 3.9, "{name}, {how:?}: {z} deviations, {bias:e}");
+            let (z, by) = bias(&film, reference, 1.0);
+            eprintln!("{name}, {how:?}: z = {z:.2}, bias {by:.2e}");
+            let what = format!("{z} deviations, {by:e}");
+            let of_how = format!("{name}, {how:?}");
+            assert_alike(&of_how, &film, reference, z.abs() < 3.9, what);
             // Companion: 1 % too dark.
-            let (z, _) = apart(&film, reference, 0.99);
+            let (z, _) = bias(&film, reference, 0.99);
             assert!(z.abs() > 3.9, "{name}: 1 % is not found: {z}");
         }
     }
@@ -322,18 +311,14 @@ fn both_backends_sample_the_same_lights() {
         for (integrator, light_sampling) in SAMPLED {
             let settings = Settings {
                 integrator,
-                light_sampling,
+                light_sampling: Some(light_sampling),
                 ..settings(&scene, 24, 18, 64)
             };
             let (a, b) = (render_gpu(&scene, &settings), render_cpu(&scene, &settings));
-            let (x, y) = (means(&a), means(&b));
-            let off = |(x, y): &(&f64, &f64)| (*x - *y).abs() > 1.0e-3 * y.abs();
-            let share = x.iter().zip(&y).filter(off).count() as f64 / x.len() as f64;
-            let name = integrator.name();
-            assert!(
-                share < 0.03,
-                "{name}, {light_sampling:?}: {share} of the values differ"
-            );
+            let share = share_off(&a, &b);
+            let name = format!("{}, {light_sampling:?}", integrator.name());
+            let what = format!("{share} of the values differ");
+            assert_alike(&name, &a, &b, share < 0.03, what);
             let rays = a.tally().rays as f64 / b.tally().rays as f64;
             assert!((rays - 1.0).abs() < 1.0e-3, "{rays}");
         }

@@ -42,6 +42,7 @@ mod input;
 mod job;
 mod layout;
 mod ledger;
+mod library;
 mod lights;
 mod limits;
 mod material_keys;

@@ -17,6 +17,7 @@ use gpu_trace::settings::{Integrator, Settings};
 use gpu_trace::statistics::{mean_and_error, normal_limit};
 use gpu_trace::verify::{Random, settings};
 
+use crate::common::images::{assert_alike, largest_difference};
 use crate::common::{job, render_cpu, render_gpu, scene};
 
 /// Materials that mixes are of, from line 1 on.
@@ -74,22 +75,6 @@ fn ball(lines: &str) -> Scene {
     scene(&text(lines))
 }
 
-/// The largest difference of two images' pixels, over the largest value.
-fn apart(a: &Film, b: &Film) -> f64 {
-    let pixels = 0..a.rect().pixels();
-    let values = pixels.flat_map(|i| {
-        let [a, b] = [a, b].map(|film| film.mean(i));
-        (0..3).map(move |c| (a[c], b[c])).collect::<Vec<_>>()
-    });
-    let values: Vec<(f64, f64)> = values.collect();
-    let largest = values.iter().map(|(_, b)| *b).fold(0.0, f64::max);
-    values
-        .iter()
-        .map(|(a, b)| (a - b).abs())
-        .fold(0.0, f64::max)
-        / largest
-}
-
 fn image(scene: &Scene) -> Film {
     render_gpu(scene, &settings(scene, 24, 24, 16))
 }
@@ -108,12 +93,13 @@ fn colours_are_mixed() {
         ("{ noise = [0, 1], size = 0.4, octaves = 3 }", &noise),
     ] {
         let mixed = image(&ball(&mix_of("red", "blue", weight)));
-        let found = apart(&mixed, &image(&ball(colour)));
+        let wanted = image(&ball(colour));
+        let found = largest_difference(&mixed, &wanted);
         eprintln!("{weight}: {found:e}");
-        assert!(found < 1.0e-5, "{weight}: {found:e}");
+        assert_alike(weight, &mixed, &wanted, found < 1.0e-5, found);
         // Companion: the other way round.
         let other = image(&ball(&mix_of("blue", "red", weight)));
-        assert!(apart(&other, &image(&ball(colour))) > 1.0e-2, "{weight}");
+        assert!(largest_difference(&other, &wanted) > 1.0e-2, "{weight}");
     }
 }
 
@@ -122,13 +108,15 @@ fn weights_of_0_and_1_are_the_parts() {
     for name in ["mirror", "gold", "cloth", "coated"] {
         let alone = image(&part(name));
         for (a, b, weight) in [(name, "red", "0.0"), ("red", name, "1.0")] {
-            let found = apart(&image(&ball(&mix_of(a, b, weight))), &alone);
+            let mixed = image(&ball(&mix_of(a, b, weight)));
+            let found = largest_difference(&mixed, &alone);
             eprintln!("{name} {weight}: {found:e}");
-            assert!(found < 1.0e-4, "{name} {weight}: {found:e}");
+            let name = format!("{name} {weight}");
+            assert_alike(&name, &mixed, &alone, found < 1.0e-4, found);
         }
         // Companion.
         let other = image(&ball(&mix_of("red", name, "0.9375")));
-        assert!(apart(&other, &alone) > 1.0e-3, "{name}");
+        assert!(largest_difference(&other, &alone) > 1.0e-3, "{name}");
     }
 }
 
@@ -278,7 +266,8 @@ fn mixes_of_mixes_are_flat() {
     assert!(own.albedo().cmple(most).all());
     let film = image(&scene);
     let cpu = render_cpu(&scene, &settings(&scene, 24, 24, 16));
-    assert!(apart(&film, &cpu) < 1.0e-2, "{}", apart(&film, &cpu));
+    let found = largest_difference(&film, &cpu);
+    assert_alike("mixes of mixes", &film, &cpu, found < 1.0e-2, found);
 }
 
 #[test]

@@ -59,7 +59,7 @@ fn blocks(film: &Film) -> Vec<[f64; 2]> {
 
 /// The largest deviation of a block's channel from that of another image, in standard errors of both; and how many of
 /// these a change by 5 % would be in the mean.
-fn apart(a: &[[f64; 2]], b: &[[f64; 2]]) -> [f64; 2] {
+fn blocks_apart(a: &[[f64; 2]], b: &[[f64; 2]]) -> [f64; 2] {
     let error = |a: &[f64; 2], b: &[f64; 2]| (a[1] + b[1]).sqrt();
     let all = a.iter().zip(b);
     let worst = all
@@ -103,13 +103,13 @@ fn check_frames(scene: &Scene, settings: &Settings) {
         ..settings.clone()
     };
     let frames = mean_of_frames(scene, &part, FRAMES);
-    let [worst, power] = apart(&found, &frames);
+    let [worst, power] = blocks_apart(&found, &frames);
     // Companion: half as far.
     let mut slower = scene.clone();
     for sphere in &mut slower.spheres {
         sphere.motion *= 0.5;
     }
-    let [wrong, _] = apart(&blocks(&render_gpu(&slower, &whole)), &frames);
+    let [wrong, _] = blocks_apart(&blocks(&render_gpu(&slower, &whole)), &frames);
     let limit = normal_limit(found.len());
     let name = settings.integrator.name();
     eprintln!(
@@ -153,7 +153,7 @@ fn a_moving_lamp_is_the_mean_of_its_frames() {
         }
         let settings = Settings {
             integrator,
-            light_sampling,
+            light_sampling: integrator.samples_lights().then_some(light_sampling),
             ..base.clone()
         };
         check_frames(&scene, &settings);

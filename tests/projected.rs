@@ -342,7 +342,7 @@ impl Cells {
 }
 
 #[test]
-fn directions_have_their_density() {
+fn directions_have_their_pdf() {
     let mut random = Random::new("projected");
     let probe = probe(&PROJECTED);
     let mut p_values = Vec::new();

@@ -17,6 +17,7 @@ use gpu_trace::settings::{GeometryChoice, Integrator, Offset, Settings, View};
 use gpu_trace::statistics::mean_and_error;
 use gpu_trace::verify::{Random, settings};
 
+use crate::common::images::{assert_alike, channels_by_batches};
 use crate::common::{cpu_renderer, gpu, gpu_renderer, job, scene, scene_file};
 use crate::thorough::thorough;
 
@@ -145,16 +146,6 @@ fn cells_are_those_of_scene_and_size() {
     );
 }
 
-/// Mean and standard error of an image, by channel.
-fn mean(film: &Film) -> [[f64; 2]; 3] {
-    let pixels = film.rect().pixels();
-    let variance = film.variance_of_image_mean().expect("16 batches");
-    [0, 1, 2].map(|c| {
-        let sum: f64 = (0..pixels).map(|i| film.mean(i)[c]).sum();
-        [sum / pixels as f64, variance[c].sqrt()]
-    })
-}
-
 fn film_of(renderer: &mut GpuRenderer, settings: &Settings) -> Film {
     let outcome = render_quietly(renderer, settings).unwrap_or_else(|e| panic!("{e}"));
     outcome.film
@@ -197,7 +188,7 @@ fn blocks(
 
 /// The mean over blocks of their squared differences over the variance; of all together the difference in standard
 /// errors, and the half of its 99 % interval, relative: what a bias could be and not be seen.
-fn apart(with: &[[f64; 2]], without: &[[f64; 2]]) -> [f64; 3] {
+fn blocks_apart(with: &[[f64; 2]], without: &[[f64; 2]]) -> [f64; 3] {
     let z = |([a, e], [b, f]): (&[f64; 2], &[f64; 2])| (a - b) / e.hypot(*f);
     let mut all: Vec<f64> = std::iter::zip(with, without).map(z).collect();
     let total = all.pop().unwrap_or_default();
@@ -262,7 +253,7 @@ fn it_changes_no_mean() {
         assert!(job(&scene, &with).cells().is_some(), "{name}");
         let truth = blocks(gpu_renderer(&scene, &without), &without, seeds..2 * seeds);
         let found = blocks(gpu_renderer(&scene, &with), &with, 0..seeds);
-        let [squares, z, unseen] = apart(&found, &truth);
+        let [squares, z, unseen] = blocks_apart(&found, &truth);
         eprintln!(
             "{name}: squares of z {squares:.3}; mean: z {z:.2}, biases below {unseen:.5} are not seen"
         );
@@ -275,7 +266,7 @@ fn it_changes_no_mean() {
         let never = [("CORRECTED", -1.0)];
         let renderer = GpuRenderer::with_constants(gpu(), &job(&scene, &with), &never);
         let renderer = renderer.unwrap_or_else(|e| panic!("{e}"));
-        let [squares, z, _] = apart(&blocks(renderer, &with, 0..seeds), &truth);
+        let [squares, z, _] = blocks_apart(&blocks(renderer, &with, 0..seeds), &truth);
         eprintln!("{name} without corrections: squares of z {squares:.3}; mean: z {z:.2}");
         assert!(squares > APART, "{name}: {squares}");
     }
@@ -290,7 +281,7 @@ fn stated(scene: &Scene, seeds: u64) -> [f64; 2] {
     for seed in 0..seeds {
         renderer = renderer.with_seed(seed);
         let film = film_of(&mut renderer, &settings);
-        let [value, error] = mean(&film)[0];
+        let [value, error] = channels_by_batches(&film)[0];
         means.push(value);
         said += error.powi(2) / seeds as f64;
         let pixels = film.rect().pixels();
@@ -335,17 +326,20 @@ fn dark_cells_are_cells() {
     let dark = ball(0.03);
     let settings = cached(&dark, 96, 96, 64);
     let outcome = render_quietly(&mut cpu_renderer(&dark, &settings), &settings);
-    let reference = mean(&outcome.unwrap_or_else(|e| panic!("{e}")).film);
-    let off = |scene: &Scene| {
-        let found = mean(&film_of(&mut gpu_renderer(scene, &settings), &settings));
-        let pairs = std::iter::zip(found, reference);
+    let reference = outcome.unwrap_or_else(|e| panic!("{e}")).film;
+    let film = |scene: &Scene| film_of(&mut gpu_renderer(scene, &settings), &settings);
+    let off = |film: &Film| {
+        let [found, wanted] = [film, &reference].map(channels_by_batches);
+        let pairs = std::iter::zip(found, wanted);
         let off = pairs.map(|([a, _], [b, _])| (a / b - 1.0).abs());
         off.fold(0.0, f64::max)
     };
     // Found 1e-7, which is rounding; 1e-4 where such cells were taken for none.
-    assert!(off(&dark) < 1.0e-5, "{}", off(&dark));
+    let found = film(&dark);
+    let by = off(&found);
+    assert_alike("dark cells", &found, &reference, by < 1.0e-5, by);
     // A companion: a hundredth more is reflected.
-    assert!(off(&ball(0.0303)) > 1.0e-5);
+    assert!(off(&film(&ball(0.0303))) > 1.0e-5);
 }
 
 /// The reference says the same of the image's mean, and parts of a render add up to the whole.
@@ -366,18 +360,18 @@ fn the_error_of_the_mean_is_that_of_all_parts() {
     joined.join(&rest);
     let outcome = render_quietly(&mut cpu_renderer(&room, &whole), &whole);
     let reference = outcome.unwrap_or_else(|e| panic!("{e}")).film;
-    let errors = [&film, &joined, &reference].map(|film| mean(film).map(|[_, error]| error));
+    let errors_of = |film: &Film| channels_by_batches(film).map(|[_, error]| error);
+    let errors = [&film, &joined, &reference].map(errors_of);
     let near = |a: [f64; 3], b: [f64; 3], most: f64| {
         std::iter::zip(a, b).all(|(a, b)| (a / b - 1.0).abs() < most)
     };
-    assert!(near(errors[1], errors[0], 1.0e-9), "{errors:?}");
-    assert!(near(errors[2], errors[0], 1.0e-2), "{errors:?}");
+    let said = format!("{errors:?}");
+    let of_parts = near(errors[1], errors[0], 1.0e-9);
+    assert_alike("the error of parts", &joined, &film, of_parts, &said);
+    let of_reference = near(errors[2], errors[0], 1.0e-2);
+    assert_alike("the error", &film, &reference, of_reference, &said);
     // A companion: a part has another error.
-    assert!(!near(
-        mean(&first).map(|[_, error]| error),
-        errors[0],
-        1.0e-2
-    ));
+    assert!(!near(errors_of(&first), errors[0], 1.0e-2));
 }
 
 #[test]

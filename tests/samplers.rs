@@ -1,6 +1,7 @@
 //! Both samplers: the same image, true error bars, the same paths on device and host, and samples that
 //! are a function of seed, pixel and index alone.
 
+use crate::common::images::assert_alike;
 use crate::common::{gpu_renderer, render_cpu, render_gpu, scene_file};
 use glam::DVec3;
 use gpu_trace::film::{Film, window_end};
@@ -157,7 +158,7 @@ fn samplers_give_the_same_image() {
         let sobol = film(&scene, Sampler::Sobol, 2);
         let z = difference(&independent, &sobol);
         eprintln!("{name}: z = {z:.2}");
-        assert!(z.abs() < 3.9, "{name}: {z}");
+        assert_alike(name, &sobol, &independent, z.abs() < 3.9, z);
         if name == "lecture" {
             let mut brighter = scene.clone();
             for material in &mut brighter.materials {
@@ -193,11 +194,12 @@ fn the_same_paths_and_error_bars_on_device_and_host() {
                 })
                 .collect();
             let share = all.iter().filter(|near| **near).count() as f64 / all.len() as f64;
-            eprintln!("{sampler:?}, {name}: {share:.3} of the pixels agree");
-            assert!(
-                share > 0.9,
-                "{sampler:?}, {name}: {share} of the pixels agree"
+            let (name, what) = (
+                format!("{sampler:?}, {name}"),
+                format!("{share:.3} of the pixels agree"),
             );
+            eprintln!("{name}: {what}");
+            assert_alike(&name, &film, &reference, share > 0.9, what);
             // Companion: another seed has other paths.
             let other = Settings {
                 seed: 1,
@@ -235,7 +237,14 @@ fn samples_are_a_function_of_seed_pixel_and_index() {
             // Dispatches end within batches.
             for (tiles, samples) in [(1, 4), (u32::MAX, 12), (2, 28)] {
                 let split = film_of(&scene, &whole, DispatchLimits { tiles, samples });
-                assert_eq!(image_bits(&film), image_bits(&split), "{sampler:?}");
+                let same = image_bits(&film) == image_bits(&split);
+                assert_alike(
+                    &format!("{sampler:?}, split"),
+                    &split,
+                    &film,
+                    same,
+                    "other bits",
+                );
                 for i in 0..film.rect().pixels() {
                     assert_eq!(film.variance_of_mean(i), split.variance_of_mean(i));
                 }

@@ -50,7 +50,6 @@ pub(crate) fn table(gpu: &Gpu, seeds: u64, names: &[&String]) {
             height,
             crop: Rect::whole(width, height),
             integrator,
-            roulette: !integrator.is_lecture(),
             ..Settings::for_scene(&loaded.scene)
         };
         let job = prepare(&loaded.scene, &settings).unwrap_or_else(|e| panic!("{e}"));

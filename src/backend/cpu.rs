@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use crate::error::{Error, Result};
 use crate::film::{AovSums, BLOCK, NonFinite, PixelSums, Tally, Tiles, Window};
 use crate::job::Job;
+use crate::memory::{aov_bytes, check_memory, render_pixel_bytes};
 use crate::placement::Placement;
 use crate::placement::cells::Cells;
 use crate::reference::path::PathTracer;
@@ -32,16 +33,29 @@ impl ReferenceRenderer {
     /// A renderer on `threads` threads; 0: one a core.
     ///
     /// # Errors
-    /// [`Error::Device`] if the threads do not start.
+    /// [`Error::Device`] if the threads do not start, [`Error::Usage`] if the image needs more memory than there is, and
+    /// for a view of what is not here.
     pub fn new(job: &Job, threads: usize) -> Result<Self> {
+        let settings = job.settings();
+        if let Some(view) = settings.view {
+            return Err(Error::Usage(format!(
+                "--view {}: the CPU reference has no tree: it asks every sphere",
+                view.name()
+            )));
+        }
         let threads = rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
             .build()
             .map_err(|e| Error::Device(format!("cannot start {threads} threads: {e}")))?;
+        // After the threads have taken their part.
+        check_memory(
+            &settings.crop,
+            render_pixel_bytes(settings, own_pixel_bytes(settings)),
+        )?;
         Ok(Self {
             scene: job.scene().clone(),
             placement: job.placement().clone(),
-            settings: job.settings().clone(),
+            settings: settings.clone(),
             values: None,
             threads,
         })
@@ -82,8 +96,13 @@ impl ReferenceRenderer {
     }
 }
 
-/// Bytes that a pixel takes in the middle of a window, sums beside the image aside.
-pub(crate) const PIXEL_BYTES: usize = size_of::<PixelState>();
+/// Bytes that a pixel takes here in the middle of a window.
+pub(super) fn own_pixel_bytes(settings: &Settings) -> usize {
+    let aovs = aov_bytes(settings);
+    // Boxed, with what the heap adds.
+    let boxed = if aovs > 0 { aovs + 16 } else { 0 };
+    size_of::<PixelState>() + boxed
+}
 
 /// One pixel's sums in the middle of a window.
 #[derive(Clone, Debug, Default)]

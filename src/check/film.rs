@@ -132,7 +132,7 @@ fn odd_sizes(context: &Context) -> Result<Measure> {
     for [width, height] in sizes {
         // Without roulette every path ends in light: no pixel is black that was rendered.
         let whole = Settings {
-            roulette: false,
+            roulette: Some(false),
             ..sized(context, &scene, [width, height], 1)
         };
         let film = context.render(&scene, &whole)?;

@@ -75,7 +75,7 @@ fn furnaces(context: &Context) -> Result<Measure> {
     for (albedo, radius) in all {
         let scene = closed(albedo, 1.0, radius).load()?;
         let settings = Settings {
-            roulette: false,
+            roulette: Some(false),
             ..context.settings(&scene, 8, 8)
         };
         let film = context.render(&scene, &settings)?;
@@ -117,7 +117,7 @@ fn roulette(context: &Context) -> Result<Measure> {
         };
         // Other samples, so that the two are independent.
         let off = Settings {
-            roulette: false,
+            roulette: Some(false),
             seed: 1,
             ..on.clone()
         };
@@ -226,7 +226,7 @@ fn extremes(context: &Context) -> Result<Measure> {
         let scene = closed(albedo, emission, radius).load()?;
         let settings = Settings {
             max_bounces: bounces,
-            roulette: false,
+            roulette: Some(false),
             ..context.settings(&scene, 2, 4)
         };
         let film = context.render(&scene, &settings)?;

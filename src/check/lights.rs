@@ -120,7 +120,7 @@ fn furnace(context: &Context, radius: f64, measure: &mut Measure) -> Result<()> 
     // would be found in two ways, whose sum has a variance.
     let settings = Settings {
         integrator: Integrator::Bsdf,
-        roulette: false,
+        roulette: Some(false),
         max_bounces: BOUNCES,
         ..context.settings(&scene, SIDE, 16)
     };
@@ -155,7 +155,7 @@ fn contrast(context: &Context, measure: &mut Measure) -> Result<()> {
             .diffuse("ball", 0.5, 0.0)
             .load()?;
         let settings = Settings {
-            roulette: false,
+            roulette: Some(false),
             ..context.settings(&scene, SIDE, spp)
         };
         let film = means(&context.render(&scene, &settings)?);

@@ -266,7 +266,7 @@ fn limbs(context: &Context, scale: f64, how: LightSampling, measure: &mut Measur
             .load()?;
         let settings = Settings {
             integrator: Integrator::Nee,
-            light_sampling: how,
+            light_sampling: Some(how),
             max_bounces: 1,
             ..context.settings(&scene, 8, spp)
         };
@@ -301,7 +301,7 @@ fn hollow(context: &Context, scale: f64, how: LightSampling, measure: &mut Measu
     for integrator in [Integrator::Path, Integrator::Nee] {
         let settings = Settings {
             integrator,
-            light_sampling: how,
+            light_sampling: Some(how),
             ..context.settings(&scene, 16, context.size(256, 1024))
         };
         let film = context.render(&scene, &settings)?;

@@ -10,8 +10,8 @@ use glam::DVec3;
 use super::choices::{self, Caching, Estimator, Wanted};
 use super::fault::Fault;
 use super::values;
-use crate::backend::{BackendChoice, BackendKind};
-use crate::choice::{Candidate, Choice, choose};
+use crate::backend::BackendChoice;
+use crate::choice::{Choice, Open, choose};
 use crate::error::{Error, Result};
 use crate::output::{Aov, ProgressMode};
 use crate::sampler::Sampler;
@@ -410,15 +410,11 @@ impl RenderArgs {
     /// Those of [`settings`](Self::settings).
     pub(super) fn decide(&self, scene: &Scene) -> Result<(Settings, Option<Choice>)> {
         let settings = self.settings_but_integrator(scene)?;
-        let mut rivals = Vec::new();
-        // Who says how lights are sampled wants them to be sampled, and the radiance cache is that of `path`.
-        let is_path = self.light_sampling.is_some() || settings.radiance_cache;
-        if self.integrator == Estimator::Auto && !is_path {
-            rivals.push(Candidate::Bsdf);
-        }
-        if self.radiance_cache == Some(Caching::Auto) && settings.integrator == Integrator::Path {
-            rivals.push(Candidate::RadianceCache);
-        }
+        let open = Open {
+            integrator: self.integrator == Estimator::Auto,
+            radiance_cache: self.radiance_cache == Some(Caching::Auto),
+        };
+        let rivals = open.rivals(&settings);
         if rivals.is_empty() {
             return Ok((settings, None));
         }
@@ -452,9 +448,9 @@ impl RenderArgs {
             seed: self.seed,
             max_bounces: self.max_bounces.unwrap_or(settings.max_bounces),
             integrator: integrator.with_termination(termination),
-            light_sampling: self.light_sampling.unwrap_or_default(),
+            light_sampling: self.light_sampling,
             radiance_cache: self.radiance_cache == Some(Caching::On),
-            roulette: !integrator.is_lecture() && self.roulette != Some(false),
+            roulette: self.roulette,
             sampler: self.sampler,
             geometry: self.geometry,
             view: self.view,
@@ -477,23 +473,6 @@ impl RenderArgs {
                 "--termination is the lecture's: add --integrator lecture".into(),
             ));
         }
-        let blind = named.filter(|i| i.is_lecture() || *i == Integrator::Bsdf);
-        if let Some(blind) = blind.filter(|_| self.light_sampling.is_some()) {
-            return Err(Error::Usage(format!(
-                "--light-sampling says how path and nee sample lights: --integrator {} does not",
-                blind.name()
-            )));
-        }
-        if self.roulette.is_some() && lecture {
-            return Err(Error::Usage(
-                "--integrator lecture has its own roulette: --termination 0 turns it off".into(),
-            ));
-        }
-        if self.backend == Wanted::Only(BackendKind::Cpu) && self.device.is_some() {
-            return Err(Error::Usage(
-                "--device chooses a GPU, --backend cpu uses none".into(),
-            ));
-        }
-        Ok(())
+        self.backend_choice().check()
     }
 }

@@ -12,10 +12,11 @@ use super::effects::{shares, shares_text};
 use super::format::{duration, percent, significant};
 use super::signals::Signals;
 use super::{print, values};
-use crate::backend::{Backend, BackendChoice, LEAST_PIXEL_BYTES, check_memory};
+use crate::backend::{Backend, BackendChoice, BackendKind};
 use crate::error::{Error, Result};
 use crate::forecast::{self, Forecast, Pilot};
 use crate::job::prepare;
+use crate::memory::{LEAST_PIXEL_BYTES, check_memory};
 use crate::output::Progress;
 use crate::prices::{Price, PriceList, smaller};
 use crate::settings::{MAXIMUM_SPP, Rect, Settings};
@@ -121,8 +122,11 @@ pub(super) fn run(args: &PriceArgs) -> Result<()> {
     };
     for wanted in chosen {
         let opening = Instant::now();
+        // Of several backends those that have devices.
+        let device = render.device.as_deref();
         let choice = BackendChoice {
             kind: wanted.kind(),
+            device: device.filter(|_| wanted.kind() != Some(BackendKind::Cpu)),
             ..render.backend_choice()
         };
         let backend = Backend::open(&choice, &mut warnings)?;

@@ -120,6 +120,8 @@ pub(super) fn rows() -> Vec<Row> {
         )
         .needs([Effect::Interior])
         .needs(forms_that(|form| form.transmits))
+        // Of what is within: something opaque, or a dielectric, which then shares points with the one around it.
+        .needs([forms_that(|form| !form.transmits), vec![Effect::Priority]].concat())
         .excludes([Effect::Nudge, Effect::Ulp])
         .marks([
             "can_be_hit",

@@ -106,7 +106,7 @@ pub(super) fn rows() -> Vec<Row> {
             "projected",
             "light sampling by projected solid angle",
             |asked| {
-                let projected = asked.settings.light_sampling == LightSampling::Projected;
+                let projected = asked.settings.light_sampling() == LightSampling::Projected;
                 when(samples_lights(asked) && projected, || {
                     "light sampling projected".into()
                 })
@@ -120,7 +120,7 @@ pub(super) fn rows() -> Vec<Row> {
             "lights drawn from a table by power, whatever the vertex",
             |asked| {
                 let lights = &asked.placement.lights;
-                let sampling = asked.settings.light_sampling;
+                let sampling = asked.settings.light_sampling();
                 when(
                     samples_lights(asked) && lights.from_table(sampling),
                     || match sampling {
@@ -160,10 +160,7 @@ fn environment<'a>(asked: &Asked<'a>) -> Option<&'a Environment> {
 
 /// Whether vertices look for light.
 fn looks_for_light(asked: &Asked<'_>) -> bool {
-    matches!(
-        asked.settings.integrator,
-        Integrator::Path | Integrator::Nee
-    )
+    asked.settings.integrator.samples_lights()
 }
 
 /// Whether they look for lamps.

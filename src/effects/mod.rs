@@ -14,6 +14,7 @@ mod obstacle;
 mod paths;
 mod role;
 mod row;
+mod rules;
 mod samples;
 mod surfaces;
 mod table;
@@ -32,6 +33,7 @@ pub use geometry::{BAKED_LIMIT, BAKED_MOST};
 pub use obstacle::cache_obstacle;
 pub use role::Role;
 pub use row::{Effect, Row, Why};
+pub use rules::{completed, conflict};
 pub use table::table;
 
 use asked::when;

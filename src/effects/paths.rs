@@ -2,18 +2,15 @@
 
 use super::surfaces::forms_that;
 use super::{Effect, Row, cache_obstacle, when};
-use crate::materials::diffuse;
-use crate::settings::Integrator;
 
 pub(super) fn rows() -> Vec<Row> {
-    let lecture = |integrator| matches!(integrator, Integrator::Lecture { .. });
     vec![
         Row::new(
             Effect::Lecture,
             "lecture",
             "uniform hemisphere, constant probability of termination",
-            move |asked| {
-                when(lecture(asked.settings.integrator), || {
+            |asked| {
+                when(asked.settings.integrator.is_lecture(), || {
                     "--integrator lecture".into()
                 })
             },
@@ -23,10 +20,9 @@ pub(super) fn rows() -> Vec<Row> {
             Effect::Roulette,
             "roulette",
             "Russian roulette on the throughput",
-            move |asked| {
-                let integrator = asked.settings.integrator;
-                when(asked.settings.roulette && !lecture(integrator), || {
-                    format!("integrator {}", integrator.name())
+            |asked| {
+                when(asked.settings.has_roulette(), || {
+                    format!("integrator {}", asked.settings.integrator.name())
                 })
             },
         )
@@ -45,7 +41,7 @@ pub(super) fn rows() -> Vec<Row> {
         )
         .needs([Effect::Sobol])
         .needs([Effect::Mis])
-        .needs(diffuse())
+        .needs(forms_that(|form| form.lambertian))
         .excludes([
             Effect::Lecture,
             Effect::Bvh,
@@ -89,9 +85,4 @@ pub(super) fn rows() -> Vec<Row> {
             "CELLS_WIDTH",
         ]),
     ]
-}
-
-/// The form of diffuse surfaces.
-fn diffuse() -> Vec<Effect> {
-    forms_that(|form| form.name == diffuse::NAME)
 }

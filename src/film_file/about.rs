@@ -8,6 +8,7 @@ use serde_json::Value;
 
 use super::scene::SceneRecord;
 use crate::backend::BackendKind;
+use crate::error::{self, Error};
 use crate::film::Counts;
 use crate::output::stats::Device;
 use crate::render::StoppedBy;
@@ -19,6 +20,19 @@ pub const FORMAT: u32 = 1;
 
 /// No render takes longer, in seconds: some thousand years.
 const MOST_SECONDS: f64 = 1e11;
+
+/// Refuses settings whose film no file keeps.
+///
+/// # Errors
+/// [`Error::Usage`] for a view.
+pub fn check(settings: &Settings) -> error::Result<()> {
+    settings.view.map_or(Ok(()), |view| {
+        Err(Error::Usage(format!(
+            "--checkpoint keeps light, and --view {} is none",
+            view.name()
+        )))
+    })
+}
 
 /// All that a film file says beside its arrays. The names are those of the JSON, which users' scripts rely
 /// on: add members, but rename and remove none.
@@ -196,15 +210,18 @@ impl Goal {
 
 impl Choices {
     /// Those of settings.
-    #[must_use]
-    pub fn of(settings: &Settings) -> Self {
+    ///
+    /// # Errors
+    /// Those of [`check`].
+    pub fn of(settings: &Settings) -> error::Result<Self> {
+        check(settings)?;
         let Rect {
             x,
             y,
             width,
             height,
         } = settings.crop;
-        Self {
+        Ok(Self {
             size: [settings.width, settings.height],
             crop: [x, y, width, height],
             seed: settings.seed,
@@ -213,17 +230,17 @@ impl Choices {
                 Integrator::Lecture { termination } => Some(termination),
                 _ => None,
             },
-            light_sampling: settings.light_sampling.name().into(),
+            light_sampling: settings.light_sampling().name().into(),
             sampler: settings.sampler.name().into(),
             max_bounces: settings.max_bounces,
             radiance_cache: settings.radiance_cache,
-            roulette: settings.roulette,
+            roulette: settings.has_roulette(),
             offset: settings.offset.to_string(),
             adaptive: settings.adaptive,
             classes: settings.classes,
             features: settings.features,
             geometry: settings.geometry.name().into(),
-        }
+        })
     }
 
     /// The pixels.
@@ -252,6 +269,8 @@ impl Choices {
         let integrator = named("integrator", &self.integrator, Integrator::ALL, |i| {
             i.name()
         })?;
+        let sampling = &self.light_sampling;
+        let light_sampling = named("light sampling", sampling, LightSampling::ALL, |l| l.name())?;
         let time = goal.time.map(Duration::try_from_secs_f64).transpose();
         let [start, end] = goal.samples;
         Ok(Settings {
@@ -262,15 +281,11 @@ impl Choices {
             seed: self.seed,
             max_bounces: self.max_bounces,
             integrator: integrator.with_termination(self.termination.unwrap_or_default()),
-            light_sampling: named(
-                "light sampling",
-                &self.light_sampling,
-                LightSampling::ALL,
-                |l| l.name(),
-            )?,
+            // The file has what is done, also by an estimator that does nothing of it.
+            light_sampling: integrator.samples_lights().then_some(light_sampling),
             sampler: named("sampler", &self.sampler, Sampler::ALL, |s| s.name())?,
             radiance_cache: self.radiance_cache,
-            roulette: self.roulette,
+            roulette: (!integrator.is_lecture()).then_some(self.roulette),
             geometry: named("geometry", &self.geometry, GeometryChoice::ALL, |g| {
                 g.name()
             })?,

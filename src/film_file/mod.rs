@@ -13,7 +13,7 @@ use std::fs::File;
 use std::io::{self, BufReader, BufWriter, Read, Seek, Write as _};
 use std::path::Path;
 
-pub use about::{About, Choices, Command, FORMAT, Goal, Maker};
+pub use about::{About, Choices, Command, FORMAT, Goal, Maker, check};
 pub use scene::SceneRecord;
 use serde::Deserialize;
 

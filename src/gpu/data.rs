@@ -209,8 +209,8 @@ fn sky_texels(sky: &Sky, placement: &Placement, effects: &Effects) -> (Vec<u8>, 
         .then(|| placement.sky_table(sky));
     let texel = |(column, row)| {
         let radiance = sky.texel(column, row) * placement.radiance_scale;
-        let density = table.map_or(0.0, |table| table.density(column, row));
-        radiance.as_vec3().extend(density as f32).to_array()
+        let pdf = table.map_or(0.0, |table| table.pdf(column, row));
+        radiance.as_vec3().extend(pdf as f32).to_array()
     };
     let places = (0..height).flat_map(|row| (0..width).map(move |column| (column, row)));
     (bytes_of(places.map(texel)), width)

@@ -65,12 +65,12 @@ pub(super) fn record(recording: &mut Recording<'_>, region: Rect) {
 }
 
 /// The sums of a region's pixels, and what its samples of this window add to the tally but for the
-/// counters. `light` is kernel radiance per radiance.
+/// counters. `radiance_scale` is kernel radiance per radiance.
 pub(super) fn sums(
     readings: &Readings,
     region: Rect,
     chosen: Option<&ChosenTiles>,
-    light: f64,
+    radiance_scale: f64,
 ) -> (Vec<PixelSums>, Tally) {
     let [high, low, deviations] = TEXTURES.map(|name| texels(&readings[name]));
     let mut tally = Tally::default();
@@ -84,8 +84,8 @@ pub(super) fn sums(
         }
         for c in 0..3 {
             let sum = f64::from(high[c]) + f64::from(low[c]);
-            pixel.sum[c] = sum / light;
-            pixel.m2[c] = f64::from(deviation[c]) / (light * light);
+            pixel.sum[c] = sum / radiance_scale;
+            pixel.m2[c] = f64::from(deviation[c]) / radiance_scale.powi(2);
         }
         tally.rays += high[3] as u64;
         tally.cut_throughput += f64::from(low[3]);

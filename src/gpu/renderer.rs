@@ -18,10 +18,11 @@ use crate::gpu::engine::{Engine, Pass, Program, Recording};
 use crate::gpu::pace::Pace;
 use crate::gpu::region::{self, chosen_pixels, tile_at, tiles_of};
 use crate::job::Job;
+use crate::memory::{check_memory, render_pixel_bytes, window_bytes};
 use crate::records::layout::{CameraRecord, ChosenTiles, CountersRecord, DispatchRecord};
 use crate::render::{Control, Renderer};
 use crate::sampler::Sampler;
-use crate::settings::{Integrator, Rect, stream_words};
+use crate::settings::{Integrator, Rect, Settings, stream_words};
 use crate::shader::steps::{paths_at_most, step_limit};
 use crate::shader::{Kernel, Stage, link};
 
@@ -33,6 +34,12 @@ const DISPATCH: &str = "dispatch";
 const PARTIALS: &str = "partials";
 const COUNTERS: &str = "counters";
 const ADAPTIVE_TILES: &str = "adaptive_tiles";
+
+/// Bytes of this program's memory that a pixel takes here in the middle of a window: a copy of what comes from the
+/// device, region by region.
+pub(crate) fn own_pixel_bytes(settings: &Settings) -> usize {
+    window_bytes(settings)
+}
 
 /// Renders windows on a GPU.
 #[derive(Debug)]
@@ -60,7 +67,8 @@ impl GpuRenderer {
     /// Links the kernel, uploads the scene and compiles the pipeline.
     ///
     /// # Errors
-    /// [`Error::Gpu`] if the image or the scene is beyond a limit of the device, or it fails.
+    /// [`Error::Gpu`] if the image or the scene is beyond a limit of the device, or it fails; [`Error::Usage`] if the image
+    /// needs more memory than this program has.
     pub fn new(gpu: Gpu, job: &Job) -> Result<Self> {
         Self::with_constants(gpu, job, &[])
     }
@@ -140,6 +148,11 @@ impl GpuRenderer {
         recording.upload(DISPATCH, bytemuck::bytes_of(&nothing));
         recording.dispatch(&render, 1);
         engine.run(recording)?;
+        // After the driver has taken its part.
+        check_memory(
+            &settings.crop,
+            render_pixel_bytes(settings, own_pixel_bytes(settings)),
+        )?;
 
         Ok(Self {
             engine,

@@ -12,7 +12,8 @@ pub use index::{Glass, Index, Sellmeier};
 use super::ggx::alpha;
 use super::schema::MAX_MAGNITUDE;
 use super::{
-    Bsdf, BsdfSample, BsdfValue, Event, Form, Member, MemberValue, Mistake, Surface, Value, schema,
+    Bsdf, BsdfSample, BsdfValue, Event, Form, MaterialKind, Member, MemberValue, Mistake, Surface,
+    Value, schema,
 };
 
 pub(super) const NAME: &str = "dielectric";
@@ -171,7 +172,7 @@ impl Bsdf for Dielectric {
     // What is not given does not count: scenes of before keep their hash.
     fn parameters(&self) -> Vec<(&'static str, Value)> {
         let mut parameters = vec![self.index().parameter()];
-        if self.roughness > 0.0 {
+        if self.roughness != 0.0 {
             parameters.push(("roughness", Value::Number(self.roughness)));
         }
         if self.absorption != DVec3::ZERO {
@@ -269,5 +270,22 @@ impl Bsdf for Dielectric {
 
     fn absorption(&self) -> DVec3 {
         self.absorption
+    }
+
+    fn clear(&self) -> Option<MaterialKind> {
+        let clear = || Self {
+            absorption: DVec3::ZERO,
+            ..self.clone()
+        };
+        (self.absorption != DVec3::ZERO).then(|| clear().into())
+    }
+
+    fn of_one_index(&self) -> Option<MaterialKind> {
+        let of_one = |index: Index| Self {
+            absorption: self.absorption,
+            roughness: self.roughness,
+            ..Self::smooth(index.named())
+        };
+        self.dispersion().map(|index| of_one(index).into())
     }
 }

@@ -15,6 +15,7 @@ pub const NAME: &str = "diffuse";
 
 pub(super) const FORMS: &[Form] = &[Form {
     what: "Lambert's law",
+    lambertian: true,
     ..Form::of(NAME)
 }];
 

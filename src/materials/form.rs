@@ -20,6 +20,9 @@ pub struct Form {
     pub transmits: bool,
     /// Of one that does not: whether it looks at the index before the surface.
     pub relative: bool,
+    /// Whether it reflects by Lambert's law and does nothing else, so that values of cells can stand for what it
+    /// reflects.
+    pub lambertian: bool,
     /// Whether it looks at where on the sphere the point is: `Surface::offset`, which no other kernel has.
     pub offset: bool,
     /// Members of the kernel's `Material` that it reads, besides those that all have.
@@ -45,6 +48,7 @@ impl Form {
             part_delta: false,
             transmits: false,
             relative: false,
+            lambertian: false,
             offset: false,
             members: &[],
             anchored: &[],

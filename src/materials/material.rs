@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::texturable::{EMISSION, ROUGHNESS, WEIGHT};
 use super::texture::{Texture, Textured};
-use super::{Form, MaterialKind, Texturable, Value, diffuse};
+use super::{Form, MaterialKind, Texturable, Value};
 
 /// A named material.
 #[derive(Clone, Debug, PartialEq)]
@@ -59,7 +59,7 @@ impl Material {
     /// Whether all that its surface does is to reflect by Lambert's law, with a light of its own or not.
     #[must_use]
     pub fn is_diffuse(&self) -> bool {
-        self.kind.form().name == diffuse::NAME
+        self.kind.form().lambertian
     }
 
     /// The texture of a key.

@@ -39,6 +39,9 @@ pub fn is_mix(form: &Form) -> bool {
 /// The most parts of a mix, those of mixes in it among them.
 pub const MOST_PARTS: usize = 64;
 
+/// What the parts' weights may be off 1 by rounding.
+const SLACK: f64 = 1e-9;
+
 /// Two materials: (1 - weight) f of the first and weight f of the second.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 pub struct Mix {
@@ -315,6 +318,25 @@ impl Bsdf for Mix {
     fn with_files_of(mut self, other: &Self) -> Self {
         self.parts.clone_from(&other.parts);
         self
+    }
+
+    fn lacking(&self) -> Option<&'static str> {
+        let parts = || self.parts.iter().map(|part| &part.material.kind);
+        // Each half is a mix whose weights add up to 1.
+        let sum: f64 = self.weights().iter().sum();
+        if self.parts.is_empty() {
+            Some("the parts of a mix are not there")
+        } else if self.parts.len() > MOST_PARTS {
+            Some("a mix has too many parts")
+        } else if parts().any(|kind| kind.transmits()) {
+            Some("a part of a mix is a dielectric")
+        } else if parts().any(|kind| is_mix(kind.form())) {
+            Some("a part of a mix is a mix, which would have its own parts there")
+        } else if sum.is_nan() || (sum - 1.0).abs() > SLACK {
+            Some("the weights of a mix's parts do not add up to 1")
+        } else {
+            None
+        }
     }
 
     fn parts(&self) -> &[Part] {

@@ -109,6 +109,16 @@ pub trait Bsdf {
         &[]
     }
 
+    /// The same without absorption, where it absorbs.
+    fn clear(&self) -> Option<MaterialKind> {
+        None
+    }
+
+    /// The same with one index for all wavelengths, where it has several.
+    fn of_one_index(&self) -> Option<MaterialKind> {
+        None
+    }
+
     /// The same with what does not follow from its parameters, as files' content, from the one that it was made of.
     #[must_use]
     fn with_files_of(self, _: &Self) -> Self
@@ -120,6 +130,11 @@ pub trait Bsdf {
 
     /// What is wrong with its parameters together.
     fn mistake(&self) -> Option<Mistake> {
+        None
+    }
+
+    /// What has to be put to it beside its parameters, by who makes a scene of it, and is not there or not right.
+    fn lacking(&self) -> Option<&'static str> {
         None
     }
 

@@ -22,7 +22,7 @@ pub(super) const FORMS: &[Form] = &[Form {
     members: &[
         // One over the roughness.
         Member::scalar("sheen_exponent"),
-        // How wide it scatters about the plane of incidence: of the density that is sampled.
+        // How wide it scatters about the plane of incidence: of the lobe that is sampled.
         Member::scalar("sheen_spread"),
     ],
     derives: Some(&["roughness"]),
@@ -59,14 +59,14 @@ pub(super) fn cases() -> Vec<Sheen> {
     ]
 }
 
-/// Of the density that is sampled.
-struct Density {
+/// The lobe that is sampled: of what is scattered a fit, whose pdf is known.
+struct SampledLobe {
     a: f64,
     b: f64,
     turned: f64,
 }
 
-impl Density {
+impl SampledLobe {
     fn pdf(&self, o: DVec3, i: DVec3) -> f64 {
         let log_cos = log_of(i.z.clamp(0.0, 1.0));
         let rest = -self.a * log_cos * expm1_over(self.a * log_cos);
@@ -101,9 +101,9 @@ impl Sheen {
         0.15 + 1.85 * self.roughness
     }
 
-    fn density(&self, cos_o: f64) -> Density {
+    fn sampled_lobe(&self, cos_o: f64) -> SampledLobe {
         let near = self.exponent() - 1.0;
-        Density {
+        SampledLobe {
             a: 1.0 + 0.5 * cos_o / (cos_o + 0.1),
             b: 1.0 + near * (0.1 + 0.4 * cos_o.powi(3)),
             turned: (cos_o + 0.15) / (cos_o + 0.15 + self.spread()),
@@ -123,7 +123,7 @@ impl Sheen {
         let d = (2.0 + self.exponent()) * sine / TAU;
         BsdfValue {
             f_cos: 0.25 * d * i.z / (i.z + o.z * (1.0 - i.z)) * self.color,
-            pdf: self.density(o.z).pdf(o, i),
+            pdf: self.sampled_lobe(o.z).pdf(o, i),
             event: Event::DIFFUSE,
         }
     }
@@ -175,7 +175,7 @@ impl Bsdf for Sheen {
         let frame = Frame::about(surface.normal, DVec3::Y);
         let (o, place) = (arrival(&frame, wo), DVec2::new(u[0], u[1]));
         let i = if u[2] >= UNIFORM_SHARE {
-            self.density(o.z).direction(o, place)
+            self.sampled_lobe(o.z).direction(o, place)
         } else {
             let w = sphere_direction(place);
             w.with_z(w.z.abs())

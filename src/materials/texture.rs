@@ -99,6 +99,13 @@ impl TextureImage {
         &self.image
     }
 
+    /// Whether all its values are finite.
+    #[must_use]
+    pub fn is_sound(&self) -> bool {
+        // Nothing that is not leaves the mean.
+        self.mean.is_finite()
+    }
+
     /// The unit vector at which row 0 is.
     #[must_use]
     pub fn axis(&self) -> DVec3 {

@@ -20,7 +20,7 @@ pub use exr::Layer;
 pub use metadata::{Metadata, Value};
 pub use progress::{Progress, ProgressMode, Snapshot};
 pub use stats::Stats;
-pub use target::{Target, check_all};
+pub use target::{Target, check_all, check_layers};
 
 use std::io;
 

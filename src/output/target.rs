@@ -53,6 +53,19 @@ impl Target {
     }
 }
 
+/// Refuses layers that no image has room for.
+///
+/// # Errors
+/// [`Error::Usage`] if there are some and none of the `targets` is an EXR file.
+pub fn check_layers<T>(layers: &[T], targets: &[Target]) -> Result<()> {
+    if !layers.is_empty() && !targets.iter().any(|t| t.format == Format::Exr) {
+        return Err(Error::Usage(
+            "--aov: only EXR files have room for layers: add an output such as -o image.exr".into(),
+        ));
+    }
+    Ok(())
+}
+
 impl fmt::Display for Target {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.path.display().fmt(formatter)

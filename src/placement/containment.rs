@@ -147,12 +147,12 @@ fn just_within(outer: &Sphere, inner: &Sphere) -> bool {
     let distances = outer.distances(inner);
     let difference = outer.radius - inner.radius;
     let rounding = ROUNDING * outer.radius;
-    let reach = CLOSE * outer.radius;
+    let close = CLOSE * outer.radius;
     // Where roundings tie, as always.
-    let aside = 0.5 * (inner.motion.x - outer.motion.x).abs() + reach;
+    let aside = 0.5 * (inner.motion.x - outer.motion.x).abs() + close;
     difference > 0.0
         && difference - distances.most >= -rounding
-        && difference + distances.least <= reach
+        && difference + distances.least <= close
         && inner.center.x >= outer.center.x - aside
         && inner.center.x <= outer.center.x + aside
 }

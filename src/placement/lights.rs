@@ -133,8 +133,8 @@ fn may_reach_into(glass: &Sphere, bounds: &Bounds) -> bool {
 /// distance would; what is beyond sends nothing into the picture.
 fn extent(spheres: &[PlacedSphere]) -> f64 {
     let centered = spheres.iter().filter(|s| s.pole.is_none());
-    let reach = centered.map(|s| s.anchor.length() + s.radius + 0.5 * s.motion.length());
-    let farthest = reach.fold(0.0, f64::max);
+    let distances = centered.map(|s| s.anchor.length() + s.radius + 0.5 * s.motion.length());
+    let farthest = distances.fold(0.0, f64::max);
     // Of walls alone none is larger than another, in whatever unit.
     if farthest > 0.0 { farthest } else { 1.0 }
 }

@@ -2,7 +2,7 @@
 //! from alias tables; in the texel the direction is uniform by solid angle.
 //!
 //! A texel counts by the luminance that is seen in it, of which interpolation brings some of its neighbours': so the
-//! density is positive wherever light comes from. Thresholds have 16 bits, and densities are computed from those:
+//! pdf is positive wherever light comes from. Thresholds have 16 bits, and pdfs are computed from those:
 //! they are exactly what is drawn, however small.
 
 use std::f64::consts::PI;
@@ -80,7 +80,7 @@ pub struct SkyTable {
     width: u32,
     rows: Vec<Entry>,
     columns: Vec<Entry>,
-    density: Vec<f32>,
+    pdf: Vec<f32>,
 }
 
 impl SkyTable {
@@ -94,7 +94,7 @@ impl SkyTable {
     pub fn by(sky: &Sky, strengths: impl Fn(u32) -> Vec<f64>) -> Self {
         let [width, height] = [sky.image().width, sky.image().height];
         let mut columns = Vec::with_capacity((width * height) as usize);
-        let mut density = Vec::with_capacity((width * height) as usize);
+        let mut pdf = Vec::with_capacity((width * height) as usize);
         let mut powers = Vec::with_capacity(height as usize);
         for row in 0..height {
             let strengths = strengths(row);
@@ -104,26 +104,26 @@ impl SkyTable {
             let entries = quantised(&strengths, sum);
             let texel = band / f64::from(width);
             // In the row, until the rows are known.
-            density.extend(probabilities(&entries).map(|p| (p / texel) as f32));
+            pdf.extend(probabilities(&entries).map(|p| (p / texel) as f32));
             columns.extend(entries);
         }
         let rows = quantised(&powers, powers.iter().sum());
         let of_rows: Vec<f64> = probabilities(&rows).collect();
-        for (place, density) in density.iter_mut().enumerate() {
-            *density = (f64::from(*density) * of_rows[place / width as usize]) as f32;
+        for (place, pdf) in pdf.iter_mut().enumerate() {
+            *pdf = (f64::from(*pdf) * of_rows[place / width as usize]) as f32;
         }
         Self {
             width,
             rows,
             columns,
-            density,
+            pdf,
         }
     }
 
-    /// The same with what another table says of its densities, for tests of one that is made wrongly.
+    /// The same with what another table says of its pdfs, for tests of one that is made wrongly.
     #[must_use]
     pub fn that_claims(mut self, other: &Self) -> Self {
-        self.density.clone_from(&other.density);
+        self.pdf.clone_from(&other.pdf);
         self
     }
 
@@ -145,10 +145,10 @@ impl SkyTable {
         self.columns[row as usize * self.width as usize + place as usize]
     }
 
-    /// The density in solid angle with which directions in a texel are drawn.
+    /// The pdf in solid angle with which directions in a texel are drawn.
     #[must_use]
-    pub fn density(&self, column: u32, row: u32) -> f64 {
-        self.density[row as usize * self.width as usize + column as usize].into()
+    pub fn pdf(&self, column: u32, row: u32) -> f64 {
+        self.pdf[row as usize * self.width as usize + column as usize].into()
     }
 }
 

@@ -34,7 +34,7 @@ pub(super) struct Ball {
     center: DVec3,
     radius: f64,
     /// How far it gets from there, by coordinate; 0 at rest, else with the margin.
-    reach: DVec3,
+    half_way: DVec3,
 }
 
 impl Ball {
@@ -46,7 +46,7 @@ impl Ball {
         Self {
             center,
             radius,
-            reach: 0.5 * (1.0 + MARGIN) * motion.abs(),
+            half_way: 0.5 * (1.0 + MARGIN) * motion.abs(),
         }
     }
 }
@@ -85,12 +85,12 @@ impl Bounds {
             let Ball {
                 center,
                 radius,
-                reach,
+                half_way,
             } = balls[i];
             Self {
-                low: all.low.min(center - reach),
-                high: all.high.max(center + reach),
-                moves: all.moves || reach != DVec3::ZERO,
+                low: all.low.min(center - half_way),
+                high: all.high.max(center + half_way),
+                moves: all.moves || half_way != DVec3::ZERO,
                 least: all.least.min(radius),
                 most: all.most.max(radius),
                 first: all.first.min(i),
@@ -101,21 +101,21 @@ impl Bounds {
 
     /// No centre's distance from that of `ball` is less, at any time.
     pub(super) fn nearest(&self, ball: &Ball) -> f64 {
-        let (low, high) = (ball.center - ball.reach, ball.center + ball.reach);
+        let (low, high) = (ball.center - ball.half_way, ball.center + ball.half_way);
         let gap = (self.low - high).max(low - self.high);
         gap.max(DVec3::ZERO).length() * (1.0 - self.margin(ball))
     }
 
     /// No centre's distance from that of `ball` is greater, at any time.
     pub(super) fn farthest(&self, ball: &Ball) -> f64 {
-        let (low, high) = (ball.center - ball.reach, ball.center + ball.reach);
+        let (low, high) = (ball.center - ball.half_way, ball.center + ball.half_way);
         let gap = (self.low - high).abs().max((self.high - low).abs());
         gap.length() * (1.0 + self.margin(ball))
     }
 
     /// For distances from `ball`.
     fn margin(&self, ball: &Ball) -> f64 {
-        if self.moves || ball.reach != DVec3::ZERO {
+        if self.moves || ball.half_way != DVec3::ZERO {
             MARGIN
         } else {
             0.0

@@ -7,9 +7,7 @@ use crate::effects::{BAKED_MOST, Effect};
 use crate::job::{Job, prepare};
 use crate::materials::mix::Weight;
 use crate::materials::texturable::{EMISSION, WEIGHT, texturable_key, textured_keys};
-use crate::materials::{
-    Material, MaterialKind, Texture, Textured, dielectric::Dielectric, diffuse::Diffuse, forms,
-};
+use crate::materials::{Material, MaterialKind, Texture, Textured, diffuse::Diffuse, forms};
 use crate::sampler::Sampler;
 use crate::scene::Scene;
 use crate::settings::{GeometryChoice, Integrator, LightSampling, Offset, Settings};
@@ -40,7 +38,9 @@ pub fn alternative(job: &Job, effect: Effect) -> Told<Alternative> {
     Ok(Alternative {
         what: what.to_owned(),
         job: match keeps {
-            true => other.with_effects(&[Effect::Adaptive], "--adaptive"),
+            true => other
+                .with_effects(&[Effect::Adaptive], "--adaptive")
+                .map_err(|error| error.to_string())?,
             false => other,
         },
     })
@@ -102,7 +102,7 @@ fn change(
         Effect::Adaptive => "all tiles alike",
         Effect::Form(code) => {
             let form = forms()[code as usize];
-            if job.effects().has(effect) && form.name == crate::materials::diffuse::NAME {
+            if job.effects().has(effect) && form.lambertian {
                 return Err("it is what other materials are measured against".into());
             }
             replace(scene, |kind| {
@@ -110,20 +110,19 @@ fn change(
                 let albedo = kind.color().clamp(DVec3::ZERO, DVec3::ONE);
                 is_it.then(|| Diffuse { albedo }.into())
             });
+            // What is no dielectric any more fills no overlap.
+            for sphere in &mut scene.spheres {
+                let transmits = scene.materials[sphere.material].kind.transmits();
+                sphere.priority = sphere.priority.filter(|_| transmits);
+            }
             "diffuse of its colour"
         }
         Effect::Absorption => {
-            replace(scene, |kind| match kind {
-                MaterialKind::Dielectric(glass) => Some(clear(glass).into()),
-                _ => None,
-            });
+            replace(scene, |kind| kind.clear());
             "clear glass"
         }
         Effect::Dispersion => {
-            replace(scene, |kind| match kind {
-                MaterialKind::Dielectric(glass) => Some(of_one_index(glass, kind.ior()).into()),
-                _ => None,
-            });
+            replace(scene, |kind| kind.of_one_index());
             "the index of yellow light for all"
         }
         Effect::TextureChecker => {
@@ -160,14 +159,15 @@ fn change(
         }
         Effect::Lights | Effect::Skylight => {
             settings.integrator = Integrator::Bsdf;
+            settings.light_sampling = None;
             "--integrator bsdf"
         }
         Effect::Projected => {
-            settings.light_sampling = LightSampling::Cone;
+            settings.light_sampling = Some(LightSampling::Cone);
             "--light-sampling cone"
         }
-        Effect::Table if settings.light_sampling == LightSampling::Cone => {
-            settings.light_sampling = LightSampling::Projected;
+        Effect::Table if settings.light_sampling() == LightSampling::Cone => {
+            settings.light_sampling = Some(LightSampling::Projected);
             "--light-sampling projected"
         }
         Effect::Table => return Err("so many lamps are not weighed at each vertex".into()),
@@ -180,7 +180,7 @@ fn change(
             "--radiance-cache off"
         }
         Effect::Roulette => {
-            settings.roulette = false;
+            settings.roulette = Some(false);
             "--roulette off"
         }
     })
@@ -224,21 +224,4 @@ fn keep_textures(scene: &mut Scene, is_kept: impl Fn(&str, &Texture) -> bool) {
             }
         }
     });
-}
-
-/// The same glass without absorption.
-fn clear(glass: &Dielectric) -> Dielectric {
-    Dielectric {
-        absorption: DVec3::ZERO,
-        ..glass.clone()
-    }
-}
-
-/// The same glass with one index for all wavelengths.
-fn of_one_index(glass: &Dielectric, ior: f64) -> Dielectric {
-    Dielectric {
-        absorption: glass.absorption,
-        roughness: glass.roughness,
-        ..Dielectric::smooth(ior)
-    }
 }

@@ -13,16 +13,8 @@ pub fn forced(job: &Job, effect: Effect) -> Told<Job> {
     let used: Vec<Effect> = job.effects().used().collect();
     let mut with = used.clone();
     add(effect, &mut with)?;
-    let more = &with[used.len()..];
-    for added in more {
-        for other in &with {
-            if added.row().excludes.contains(other) || other.row().excludes.contains(added) {
-                let (added, other) = (added.name(), other.name());
-                return Err(format!("{added} and {other} are not in one kernel"));
-            }
-        }
-    }
-    Ok(job.clone().with_effects(more, "forced"))
+    let forced = job.clone().with_effects(&with[used.len()..], "forced");
+    forced.map_err(|error| error.to_string())
 }
 
 /// Refuses what cannot be linked in and stay unused.

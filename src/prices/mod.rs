@@ -136,10 +136,10 @@ fn prepare_measured(scene: &Scene, settings: &Settings) -> Result<Job> {
         },
     )?;
     // All tiles get samples here: what it costs to ask is the same.
-    Ok(match settings.adaptive {
+    match settings.adaptive {
         true => job.with_effects(&[Effect::Adaptive], "--adaptive"),
-        false => job,
-    })
+        false => Ok(job),
+    }
 }
 
 /// Measures the effects that `scene` asks for with `settings`; with `left_out`, the others too.

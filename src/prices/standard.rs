@@ -138,7 +138,7 @@ pub fn standard(effect: Effect) -> (Scene, Settings) {
             (scene.width, scene.height) = (settings.width, settings.height);
             settings.max_bounces = Settings::for_scene(&scene).max_bounces;
         }
-        Effect::Table => settings.light_sampling = LightSampling::Cone,
+        Effect::Table => settings.light_sampling = Some(LightSampling::Cone),
         Effect::Baked
         | Effect::Pole
         | Effect::Interior

@@ -56,12 +56,12 @@ pub struct MaterialRecord {
 }
 
 impl MaterialRecord {
-    /// The record of `material`, emission times `light`, for lengths that are multiplied by `length`.
+    /// The record of `material`, emission times `radiance_scale`, for lengths that are multiplied by `length`.
     ///
     /// # Panics
     /// If the form of the material is not in the list of all forms.
     #[must_use]
-    pub fn new(material: &Material, light: f64, length: f64) -> Self {
+    pub fn new(material: &Material, radiance_scale: f64, length: f64) -> Self {
         let form = material.kind.form();
         let code = forms().iter().position(|f| *f == form);
         let code = code.expect("every material is in the list");
@@ -70,7 +70,7 @@ impl MaterialRecord {
             (Member::word("kind"), MemberValue::Word(code as u32)),
             (
                 Member::vector("emission"),
-                (material.emission * light).into(),
+                (material.emission * radiance_scale).into(),
             ),
             (
                 Member::vector("absorption"),

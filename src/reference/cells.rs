@@ -31,7 +31,7 @@ fn begin_at(arrived: &Ray, point: &ChartPoint, sphere: &PlacedSphere) -> Ray {
 }
 
 /// The pdf on a chart with which a cosine-weighted direction finds a point, times π; 0 for one that turns away.
-fn density(from: DVec3, direction: DVec3, to: DVec3, distance: f64, area: f64) -> f64 {
+fn chart_pdf(from: DVec3, direction: DVec3, to: DVec3, distance: f64, area: f64) -> f64 {
     let cosines = from.dot(direction).max(0.0) * (-to.dot(direction)).max(0.0);
     cosines * area / (distance * distance)
 }
@@ -109,12 +109,12 @@ impl PathTracer<'_> {
         let normal = outward * outward.dot(ray.direction).signum();
         // The pdfs of both points on the chart, but for the same factor.
         let area = chart.area(sphere, place);
-        let w = density(normal, ray.direction, vertex.normal, hit.t, area);
+        let w = chart_pdf(normal, ray.direction, vertex.normal, hit.t, area);
         let way = ((sphere.anchor - from.anchor) + other.offset) - ray.offset;
         let distance = way.length();
         let direction = way / distance;
         let area = chart.area(sphere, other_place);
-        let seen = density(normal, direction, other.normal, distance, area);
+        let seen = chart_pdf(normal, direction, other.normal, distance, area);
         let mut w_other = 0.0;
         if seen > 0.0 && distance >= chart.cell_size(sphere, other_place) {
             let ray = Ray {

@@ -5,7 +5,7 @@ use glam::DVec3;
 
 use super::light::aim::aim_at;
 use super::light::environment::{environment_radiance, sky_place};
-use super::light::skylight::{NO_SPHERE, SKY_SHARE, sample_sky, sky_density};
+use super::light::skylight::{NO_SPHERE, SKY_SHARE, sample_sky, sky_pdf};
 use super::light::sphere::{LightSample, light_pdf, mis_weight, sample_light};
 use super::path::PathTracer;
 use super::scene::ray::{Hit, Ray, Vertex, leave, vertex_at};
@@ -52,7 +52,7 @@ impl PathTracer<'_> {
             None => 1.0,
             Some((sky, table)) => {
                 let share = if self.samples_lamps() { SKY_SHARE } else { 1.0 };
-                let other = share * sky_density(sky, table, sky_place(sky, w));
+                let other = share * sky_pdf(sky, table, sky_place(sky, w));
                 self.share_of_hit(from.pdf, other)
             }
         }
@@ -69,14 +69,14 @@ impl PathTracer<'_> {
         let sphere = &self.placement.spheres[hit.index];
         let aim = aim_at(sphere, ray.anchor, ray.offset, ray.motion, ray.time);
         let pdf_per_weight =
-            (!lights.from_table(self.settings.light_sampling)).then_some(from.pdf_per_weight);
+            (!lights.from_table(self.settings.light_sampling())).then_some(from.pdf_per_weight);
         let share = self.sky().map_or(1.0, |_| 1.0 - SKY_SHARE);
         self.share_of_hit(from.pdf, share * light_pdf(light, &aim, pdf_per_weight))
     }
 
     /// A direction to a lamp or to the image.
     fn sample_direction(&self, vertex: &Vertex, own: usize, u: [f64; 4]) -> Option<LightSample> {
-        let sampling = self.settings.light_sampling;
+        let sampling = self.settings.light_sampling();
         let lamp = |u| sample_light(self.placement, sampling, vertex, own, u);
         let Some((sky, table)) = self.sky() else {
             return lamp(u);

@@ -254,7 +254,7 @@ impl PathTracer<'_> {
         let largest = (path.throughput.abs() * path.eta_scale).max_element();
         let survival = match self.settings.integrator {
             Integrator::Lecture { termination } => 1.0 - termination,
-            _ if self.settings.roulette => roulette_survival(largest),
+            _ if self.settings.has_roulette() => roulette_survival(largest),
             _ => 1.0,
         };
         if largest <= 0.0 || u >= survival {

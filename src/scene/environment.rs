@@ -46,6 +46,7 @@ pub struct Sky {
     scale: DVec3,
     rotation: f64,
     brightest: f64,
+    is_sound: bool,
 }
 
 impl Sky {
@@ -57,13 +58,38 @@ impl Sky {
             .pixels
             .iter()
             .fold(DVec3::ZERO, |most, texel| most.max(radiance(texel)));
+        let is_radiance = |x: &f32| x.is_finite() && *x >= 0.0;
         Self {
             name: name.to_owned(),
+            is_sound: image.pixels.as_flattened().iter().all(is_radiance),
             image: Arc::new(image),
             scale,
             rotation: rotation.rem_euclid(360.0),
             brightest: (most * scale).max_element(),
         }
+    }
+
+    /// Whether all texels are finite and none is negative.
+    #[must_use]
+    pub fn is_sound(&self) -> bool {
+        self.is_sound
+    }
+
+    /// The largest radiance of any channel.
+    #[must_use]
+    pub fn brightest(&self) -> f64 {
+        self.brightest
+    }
+
+    /// Refuses one that is too bright.
+    pub(super) fn check_brightest(&self) -> Result<(), String> {
+        if self.brightest <= MAX_MAGNITUDE {
+            return Ok(());
+        }
+        Err(format!(
+            "its brightest value times `scale` is {:e}, more than {MAX_MAGNITUDE:e}, the limit of a radiance",
+            self.brightest
+        ))
     }
 
     /// What messages call it: its file, as the scene names it.
@@ -258,11 +284,7 @@ fn sky(
     };
     files.push(path);
     let sky = Sky::new(image.get_ref(), texels, scale, rotation);
-    if sky.brightest > MAX_MAGNITUDE {
-        let text = format!(
-            "its brightest value times `scale` is {:e}, more than {MAX_MAGNITUDE:e}, the limit of a radiance",
-            sky.brightest
-        );
+    if let Err(text) = sky.check_brightest() {
         wrong(text, Some("a smaller `scale` brings it below"));
         return None;
     }

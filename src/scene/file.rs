@@ -7,6 +7,7 @@
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
+use std::sync::LazyLock;
 
 use glam::DVec3;
 use schemars::transform::RecursiveTransform;
@@ -395,6 +396,12 @@ fn matrix(_: &mut SchemaGenerator) -> Schema {
 
 fn point(_: &mut SchemaGenerator) -> Schema {
     vector(-MAX_MAGNITUDE, MAX_MAGNITUDE)
+}
+
+/// The same for the whole run of the program.
+pub(super) fn schema() -> &'static serde_json::Value {
+    static SCHEMA: LazyLock<serde_json::Value> = LazyLock::new(json_schema);
+    &SCHEMA
 }
 
 /// The JSON schema of a scene file (draft 2020-12), without references to follow.

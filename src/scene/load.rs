@@ -6,12 +6,12 @@
 use std::fs::{self, File};
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, LazyLock};
+use std::sync::Arc;
 
 use serde::Deserialize;
 use toml::de::{DeTable, Deserializer};
 
-use super::file::{SceneFile, json_schema};
+use super::file::{SceneFile, schema};
 use super::parsed::{Parsed, Place};
 use super::particles::look::Look;
 use super::report::{Problem, Report};
@@ -200,10 +200,8 @@ fn load(
 
 /// `None` after errors, which the report then holds.
 fn parse(text: &str, place: Place<'_>, report: &mut Report) -> Option<Parsed> {
-    static SCHEMA: LazyLock<serde_json::Value> = LazyLock::new(json_schema);
-
     if text.len() >= LONG
-        && let Some((file, keys, textures)) = pieces::parse(text, &SCHEMA)
+        && let Some((file, keys, textures)) = pieces::parse(text, schema())
     {
         return validate::scene(file, &keys, textures, place, report);
     }
@@ -217,7 +215,7 @@ fn parse(text: &str, place: Place<'_>, report: &mut Report) -> Option<Parsed> {
         ));
         return None;
     }
-    shape::check(root.get_ref(), &SCHEMA, report);
+    shape::check(root.get_ref(), schema(), report);
     if !report.errors.is_empty() {
         return None;
     }

@@ -1,10 +1,12 @@
 //! What is to be rendered: camera, spheres, materials, environment.
 //!
-//! A [`Scene`] is validated when it exists: every number is finite and in its range, every
-//! material index is in bounds. Lengths are in scene units, radiances in W/(sr m²) per colour
-//! channel (linear RGB), and everything is f64: rounding to f32 happens in one later place only.
+//! A [`Scene`] is checked before it is rendered, a file's when it is loaded, and each when a
+//! [job](crate::job) is prepared: every number is finite and in its range, every material index is in
+//! bounds. Lengths are in scene units, radiances in W/(sr m²) per colour channel (linear RGB), and
+//! everything is f64: rounding to f32 happens in one later place only.
 
 pub mod builtin;
+mod check;
 pub mod color_map;
 mod describe;
 pub mod direct;
@@ -31,6 +33,7 @@ mod texture_table;
 pub mod trajectory;
 mod validate;
 mod vector;
+mod view;
 
 pub use describe::summary;
 pub use environment::{Environment, Gradient, Sky};
@@ -42,8 +45,8 @@ use glam::DVec3;
 
 use crate::materials::Material;
 
-/// A validated scene. Built by the scene loader (`scene::load`) or from the gallery
-/// (`scene::builtin`).
+/// A scene: read by the loader (`scene::load`), from the gallery (`scene::builtin`), or made in code;
+/// [`check`](Self::check) says whether it can be one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scene {
     /// The camera.

@@ -6,7 +6,7 @@ use glam::DVec3;
 use proptest::prelude::*;
 
 use super::load::load_str;
-use super::validate::SHORTEST;
+use super::view::SHORTEST;
 use super::{
     Camera, Environment, Gradient, Handedness, MAX_BOUNCES, MAX_SIDE, MAX_SPP, RenderDefaults,
     Scene, Sphere,

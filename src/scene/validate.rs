@@ -6,6 +6,7 @@ use std::ops::Range;
 use glam::DVec3;
 use toml::Spanned;
 
+use super::check::{TINY, all_tiny, no_priority, tiny_help};
 use super::file::{CameraTable, HandednessName, MaterialTable, SceneFile, SphereTable};
 use super::motion::{check_motion, shutter};
 use super::names::{MaterialKeys, unknown_material};
@@ -13,19 +14,11 @@ use super::parsed::{Parsed, Place};
 use super::report::{Problem, Report, SHOWN};
 use super::texture_table::{self, Textures};
 use super::vector::vector;
+use super::view::{Fault, SHORTEST};
 use super::{
     Camera, Handedness, RenderDefaults, Scene, Sphere, environment, measured, mix, particles,
 };
-use crate::materials::schema::along;
 use crate::materials::{Material, Mistake};
-
-/// Directions whose angle has a smaller sine are parallel: of the sixteen digits of an f64 the
-/// cross product keeps half, which is what the f32 of the GPU needs.
-const PARALLEL: f64 = 1e-8;
-
-/// Below this length a vector's square, and that of its product with a direction that is hardly not
-/// parallel, is lost in an f64. Times the largest length, its inverse is still an f64.
-pub(super) const SHORTEST: f64 = 1e-140;
 
 /// What a file holds whose files are at that place; `None` after errors, which the report then holds.
 pub(super) fn scene(
@@ -81,10 +74,7 @@ pub(super) fn scene(
         used.insert(index);
         let dielectric = materials[index].kind.transmits();
         if let Some(priority) = sphere.priority.as_ref().filter(|_| !dielectric) {
-            let message = format!(
-                "`priority` needs a dielectric, and `{}` is none",
-                materials[index].name
-            );
+            let message = no_priority(&materials[index]);
             let problem = Problem::new(priority.span(), message, "")
                 .also(
                     sphere.material.span(),
@@ -154,16 +144,13 @@ pub(super) fn scene(
         }
     }
     used.extend(own..materials.len());
-    if !spheres.is_empty() && spheres.iter().all(|sphere| sphere.radius < SHORTEST) {
+    if all_tiny(&spheres) {
         let largest =
             largest(&file.sphere).map(|radius| (radius.span(), ": this is the largest `radius`"));
         let particles = file.particles.first().map(|table| (table.file.span(), ""));
         let (span, which) = largest.or(particles).unwrap_or_default();
-        let message = format!("the spheres are too small to compute with{which}");
-        let problem = Problem::new(span, message, "");
-        report
-            .errors
-            .push(problem.help(format!("one of them must have at least {SHORTEST:e}")));
+        let problem = Problem::new(span, format!("{TINY}{which}"), "");
+        report.errors.push(problem.help(tiny_help()));
     }
 
     texture_table::apply(
@@ -199,6 +186,14 @@ pub(super) fn scene(
     if report.errors.is_empty() {
         check_motion(&scene, &file.camera, &file.sphere, report);
     }
+    // All that it refuses has been said with its place.
+    if report.errors.is_empty()
+        && let Err(error) = scene.check()
+    {
+        report
+            .errors
+            .push(Problem::new(0..0, error.to_string(), ""));
+    }
     if !report.errors.is_empty() {
         return None;
     }
@@ -224,57 +219,10 @@ fn camera(table: &CameraTable, report: &mut Report) -> Option<Camera> {
         .as_ref()
         .map_or(DVec3::Y, |up| vector(*up.get_ref()));
     let errors = report.errors.len();
-    match direction(look_at - position) {
-        Some(_) if (look_at - position).abs().max_element() < SHORTEST => {
-            let message = "`look_at` is too near to the camera's `position` to look there";
-            let problem = Problem::new(table.look_at.span(), message, "");
-            report.errors.push(
-                problem
-                    .also(table.position.span(), "the position")
-                    .help("any point on the view axis will do: move it away"),
-            );
-        }
-        None => {
-            let problem = Problem::new(
-                table.look_at.span(),
-                "`look_at` is the camera's `position`: no direction to look in",
-                "",
-            );
-            report
-                .errors
-                .push(problem.also(table.position.span(), "the same point"));
-        }
-        Some(forward) => {
-            let sine = direction(up).map(|up| up.cross(forward).length());
-            // Without the key the default is at fault, and what it collides with is shown.
-            let span = table
-                .up
-                .as_ref()
-                .map_or_else(|| table.look_at.span(), |up| up.span());
-            let default = if table.up.is_none() {
-                ", (0, 1, 0) by default,"
-            } else {
-                ""
-            };
-            if sine.is_none() {
-                let problem = Problem::new(span, "`up` has no direction: its length is 0", "");
-                report
-                    .errors
-                    .push(problem.help("`up = [0.0, 1.0, 0.0]` is the default"));
-            } else if sine < Some(PARALLEL) {
-                let other = if forward.y.abs() < 0.9 {
-                    "[0.0, 1.0, 0.0]"
-                } else {
-                    "[0.0, 0.0, 1.0]"
-                };
-                let message = format!("`up`{default} is parallel to the camera's view axis");
-                report.errors.push(
-                    Problem::new(span, message, "")
-                        .help(format!("set another upward direction: `up = {other}`")),
-                );
-            }
-        }
-    }
+    let fault = Fault::of_view(position, look_at, up);
+    report
+        .errors
+        .extend(fault.map(|fault| of_view(fault, table, look_at - position)));
     let aperture = table
         .aperture_radius
         .as_ref()
@@ -294,12 +242,13 @@ fn camera(table: &CameraTable, report: &mut Report) -> Option<Camera> {
         }));
     }
     let focus_distance = table.focus_distance.as_ref();
-    if let Some(distance) = focus_distance.filter(|d| aperture > 0.0 && *d.get_ref() < SHORTEST) {
-        let message = "`focus_distance` is too small to compute with";
-        let problem = Problem::new(distance.span(), message, "");
+    if let Some(distance) = focus_distance
+        && let Some(fault) = Fault::of_lens(aperture, *distance.get_ref())
+    {
+        let problem = Problem::new(distance.span(), fault.what(), "");
         report
             .errors
-            .push(problem.help(format!("the least is {SHORTEST:e}")));
+            .push(problem.help(fault.help(look_at - position)));
     }
     (report.errors.len() == errors).then(|| Camera {
         position,
@@ -316,9 +265,25 @@ fn camera(table: &CameraTable, report: &mut Report) -> Option<Camera> {
     })
 }
 
-/// The vector's direction; `None` if it has none. Lengths whose square is no f64 are fine.
-fn direction(vector: DVec3) -> Option<DVec3> {
-    (vector.abs().max_element() > 0.0).then(|| along(vector))
+/// A fault of the view along `axis`, where it is.
+fn of_view(fault: Fault, table: &CameraTable, axis: DVec3) -> Problem {
+    let at_point = |label| {
+        let problem = Problem::new(table.look_at.span(), fault.what(), "");
+        problem.also(table.position.span(), label)
+    };
+    let problem = match (fault, &table.up) {
+        (Fault::TooNear, _) => at_point("the position"),
+        (Fault::NoDirection, _) => return at_point("the same point"),
+        (_, Some(up)) => Problem::new(up.span(), fault.what(), ""),
+        // Without the key the default is at fault, and what it collides with is shown.
+        (_, None) => {
+            let what = fault
+                .what()
+                .replacen("`up`", "`up`, (0, 1, 0) by default,", 1);
+            Problem::new(table.look_at.span(), what, "")
+        }
+    };
+    problem.help(fault.help(axis))
 }
 
 /// The vector, made longer by a power of two if computing with it would lose it.

@@ -119,15 +119,15 @@ fn closest_hit(text: &mut String, placement: &Placement, effects: &Effects) {
         } else {
             String::new()
         };
-        let reach = can_be_hit(placement, effects, sphere);
-        let closer = reach
+        let condition = can_be_hit(placement, effects, sphere);
+        let closer = condition
             .as_ref()
             .map_or("t < hit.t", |_| "t < hit.t && can_be_hit");
-        let reach = reach.map_or_else(String::new, |r| format!("let can_be_hit = {r};\n"));
+        let condition = condition.map_or_else(String::new, |r| format!("let can_be_hit = {r};\n"));
         let _ = write!(
             text,
             "{{\nlet x = {} + ray.offset;\nlet q = {quadratic};\n\
-             let own = ray.own == {i}u;\n{known}let t = {root};\n{reach}\
+             let own = ray.own == {i}u;\n{known}let t = {root};\n{condition}\
              let closer = {closer};\nhit.t = select(hit.t, t, closer);\n\
              hit.index = select(hit.index, {i}u, closer);\n",
             from_anchor("ray", sphere, effects),

@@ -37,8 +37,9 @@ pub struct Outcome {
 /// Conducts a study; `None` if it was stopped before there was a reference.
 ///
 /// # Errors
-/// If there is no reference for another reason. What fails later is in the outcome.
+/// Those of [`Study::check`], and if there is no reference for another reason. What fails later is in the outcome.
 pub fn conduct(study: &Study, store: &mut Store, host: &mut dyn Host) -> Result<Option<Outcome>> {
+    study.check()?;
     // Series take turns: what disturbs the machine for a while disturbs all of them.
     let turns: Vec<(u64, usize)> = study
         .seeds

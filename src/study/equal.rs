@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::fit::{Reach, reaches, value_at};
+use super::fit::{Crossing, crossing, value_at};
 use super::summary::Summary;
 
 /// Times to one error, by series.
@@ -43,19 +43,19 @@ pub(super) fn equal_error(series: &[Summary]) -> Vec<EqualError> {
     // The small ones are what renders are for.
     targets.drain(..targets.len().saturating_sub(5));
     let times = |error: f64| {
-        let reached: Vec<Reach> = curves.iter().map(|c| reaches(c, error)).collect();
+        let reached: Vec<Crossing> = curves.iter().map(|c| crossing(c, error)).collect();
         EqualError {
             error,
             at_once: reached
                 .iter()
-                .map(|r| matches!(r, Reach::Before(_)))
+                .map(|r| matches!(r, Crossing::Before(_)))
                 .collect(),
-            unknown: reached.iter().map(|r| *r == Reach::Unknown).collect(),
+            unknown: reached.iter().map(|r| *r == Crossing::Unknown).collect(),
             seconds: reached
                 .into_iter()
                 .map(|r| match r {
-                    Reach::Before(t) | Reach::At(t) => Some(t),
-                    Reach::Unknown | Reach::Never => None,
+                    Crossing::Before(t) | Crossing::At(t) => Some(t),
+                    Crossing::Unknown | Crossing::Never => None,
                 })
                 .collect(),
         }

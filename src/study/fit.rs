@@ -111,9 +111,9 @@ fn solve(mut rows: Vec<Vec<f64>>) -> Option<Vec<f64>> {
     solution.iter().all(|x| x.is_finite()).then_some(solution)
 }
 
-/// Where a curve reaches a value.
+/// Where a curve crosses a value.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Reach {
+pub enum Crossing {
     /// No later than its first point.
     Before(f64),
     /// Here.
@@ -127,22 +127,22 @@ pub enum Reach {
 /// The x at which a falling curve first reaches `y`, on a line in the logarithms of its points. What is
 /// beyond a point whose y is unknown says nothing: y may have been reached there.
 #[must_use]
-pub fn reaches(points: &[(f64, Option<f64>)], y: f64) -> Reach {
+pub fn crossing(points: &[(f64, Option<f64>)], y: f64) -> Crossing {
     let mut before: Option<(f64, f64)> = None;
     for (x, value) in points {
         let Some(value) = *value else {
-            return Reach::Unknown;
+            return Crossing::Unknown;
         };
         let point = (*x, value);
         if value <= y {
             let Some(before) = before else {
-                return Reach::Before(*x);
+                return Crossing::Before(*x);
             };
-            return between(&[before, point], y, true).map_or(Reach::Unknown, Reach::At);
+            return between(&[before, point], y, true).map_or(Crossing::Unknown, Crossing::At);
         }
         before = Some(point);
     }
-    Reach::Never
+    Crossing::Never
 }
 
 /// The y of a curve at `x`, on a line in the logarithms of its points; `None` outside of it, and beside
@@ -281,12 +281,12 @@ mod tests {
     #[test]
     fn curves_are_read_between_their_points() {
         let curve = [(1.0, Some(1.0)), (4.0, Some(0.5)), (16.0, Some(0.25))];
-        assert_eq!(reaches(&curve, 2.0), Reach::Before(1.0));
-        let Reach::At(x) = reaches(&curve, 0.5f64.sqrt()) else {
+        assert_eq!(crossing(&curve, 2.0), Crossing::Before(1.0));
+        let Crossing::At(x) = crossing(&curve, 0.5f64.sqrt()) else {
             panic!("between the first two");
         };
         assert!((x - 2.0).abs() < 1.0e-12, "{x}");
-        assert_eq!(reaches(&curve, 0.2), Reach::Never);
+        assert_eq!(crossing(&curve, 0.2), Crossing::Never);
         assert!((value_at(&curve, 8.0).expect("inside") - 0.125f64.sqrt()).abs() < 1.0e-12);
         assert_eq!(value_at(&curve, 4.0), Some(0.5));
         assert_eq!(value_at(&curve, 17.0), None);
@@ -301,9 +301,9 @@ mod tests {
             (16.0, None),
             (64.0, Some(0.2)),
         ];
-        assert!(matches!(reaches(&curve, 0.6), Reach::At(_)));
-        assert_eq!(reaches(&curve, 0.4), Reach::Unknown);
-        assert_eq!(reaches(&curve, 0.1), Reach::Unknown);
+        assert!(matches!(crossing(&curve, 0.6), Crossing::At(_)));
+        assert_eq!(crossing(&curve, 0.4), Crossing::Unknown);
+        assert_eq!(crossing(&curve, 0.1), Crossing::Unknown);
         assert!(value_at(&curve, 2.0).is_some());
         for x in [5.0, 16.0, 20.0] {
             assert_eq!(value_at(&curve, x), None);

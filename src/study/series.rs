@@ -64,7 +64,6 @@ impl Series {
             integrator: self.integrator,
             sampler: self.sampler,
             offset: self.offset,
-            roulette: !matches!(self.integrator, Integrator::Lecture { .. }),
             ..base.clone()
         }
     }

@@ -1,5 +1,7 @@
 //! What the GPU tests share: a device, kernels for any set of effects, and statistics.
 
+pub(crate) mod images;
+
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
@@ -9,7 +11,6 @@ use gpu_trace::film::Film;
 use gpu_trace::gpu::device::{DRIVER_ADVICE, DeviceChoice, Gpu, open};
 use gpu_trace::gpu::probe::Probe;
 use gpu_trace::gpu::renderer::GpuRenderer;
-use gpu_trace::image::Picture;
 use gpu_trace::job::{Job, prepare};
 use gpu_trace::placement::Placement;
 use gpu_trace::reference::light::aim::{Aim, aim_pole};
@@ -17,8 +18,7 @@ use gpu_trace::scene::Scene;
 use gpu_trace::scene::load::{load_file, load_str};
 use gpu_trace::settings::Settings;
 use gpu_trace::verify::{
-    EMPTY, Random, Row, leave_images, picture_of, reference_renderer, render_in_f64, render_on,
-    renderer_on, to_row, vector,
+    EMPTY, Random, Row, reference_renderer, render_in_f64, render_on, renderer_on, to_row, vector,
 };
 
 /// A sphere with a pole frame: its radius, and how far a vertex is above it and along it from its pole.
@@ -106,17 +106,6 @@ pub(crate) fn cpu_renderer(scene: &Scene, settings: &Settings) -> ReferenceRende
 /// Renders with the CPU reference.
 pub(crate) fn render_cpu(scene: &Scene, settings: &Settings) -> Film {
     render_in_f64(scene, settings).unwrap_or_else(|e| panic!("{e}"))
-}
-
-/// Leaves the images of a comparison that failed, and says where.
-pub(crate) fn leave(name: &str, film: &Film, reference: &Film) -> String {
-    leave_pictures(name, &picture_of(film), &picture_of(reference))
-}
-
-/// Leaves the pictures of a comparison that failed, and says where.
-pub(crate) fn leave_pictures(name: &str, found: &Picture, wanted: &Picture) -> String {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/test-images");
-    leave_images(&folder, name, found, wanted)
 }
 
 /// A probe of the functions that exactly `effects` bring, with the camera of `scene`.

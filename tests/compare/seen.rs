@@ -1,6 +1,7 @@
 //! What is seen, by figures of others' code.
 
 use super::{input, near};
+use crate::common::images::mean;
 use gpu_trace::compare::{Options, Seen, compare, flip, ssim};
 use gpu_trace::image::linear;
 
@@ -25,10 +26,6 @@ fn seen(pixels: &[[f64; 3]]) -> Seen {
         width: 40,
         pixels: pixels.iter().map(|p| p.map(linear)).collect(),
     }
-}
-
-fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len() as f64
 }
 
 /// Of the authors' own code, in f32 (`references/perception.py`).

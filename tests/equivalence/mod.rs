@@ -10,9 +10,10 @@ use gpu_trace::image::Picture;
 use gpu_trace::materials::MaterialKind;
 use gpu_trace::scene::Scene;
 use gpu_trace::statistics::normal_limit;
-use gpu_trace::verify::{picture_of, settings};
+use gpu_trace::verify::settings;
 
-use crate::common::{leave_pictures, render_gpu};
+use crate::common::images::fault_of;
+use crate::common::render_gpu;
 
 /// What another renderer says of a scene.
 pub(crate) struct Independent {
@@ -106,9 +107,10 @@ pub(crate) fn check(name: &str, scene: &Scene, other: &Independent, demand: Dema
         verdict.pooled,
         100.0 * verdict.bias
     );
-    if !verdict.passes() {
-        let left = leave_pictures(name, &picture_of(&film), &picture(&film, other));
-        panic!("{name} differs from the reference; {left}");
+    let reference = picture(&film, other);
+    let what = "it differs from the reference";
+    if let Some(fault) = fault_of(name, &film, &reference, verdict.passes(), what) {
+        panic!("{fault}");
     }
     let mut wrong = scene.clone();
     for material in &mut wrong.materials {

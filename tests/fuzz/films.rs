@@ -43,7 +43,7 @@ fn film_files() -> Vec<Vec<u8>> {
                     look: None,
                     text: "c".into(),
                 },
-                settings: Choices::of(&settings),
+                settings: Choices::of(&settings).expect("light"),
                 goal: Goal::of(&settings),
                 ranges: vec![[0, 16]],
                 samples: vec![16],

@@ -52,7 +52,7 @@ fn kernels_of(file: PathBuf) -> Vec<Linked> {
         ..Settings::for_scene(&scene)
     };
     let table = Settings {
-        light_sampling: LightSampling::Cone,
+        light_sampling: Some(LightSampling::Cone),
         ..many.clone()
     };
     // Where there can be one.

@@ -5,10 +5,10 @@
 mod kernels;
 mod pace;
 
+use crate::common::images::mean;
 use crate::common::{gpu_renderer, render_cpu, render_gpu, scene};
 use crate::thorough::thorough;
 use gpu_trace::error::Error;
-use gpu_trace::film::Film;
 use gpu_trace::render::render_quietly;
 use gpu_trace::scene::Scene;
 use gpu_trace::settings::{GeometryChoice, Integrator, Settings};
@@ -62,18 +62,13 @@ fn cloud(count: u32) -> String {
     text
 }
 
-fn mean(film: &Film) -> f64 {
-    let values = means(film);
-    values.iter().sum::<f64>() / values.len() as f64
-}
-
 #[test]
 fn more_bounces_than_a_loop_may_have_in_one_dispatch() {
     let scene = scene(FURNACE);
     let mut long = settings(&scene, 2, 2, 16);
     long.max_bounces = 10_000;
     // 10001 emissions a path, 16 paths: 160016 iterations. Sums of ones are exact.
-    assert_eq!(mean(&render_gpu(&scene, &long)), 10_001.0);
+    assert_eq!(mean(&means(&render_gpu(&scene, &long))), 10_001.0);
 }
 
 #[test]
@@ -86,8 +81,8 @@ fn more_spheres_than_a_loop_may_visit_in_one_dispatch() {
     // The same paths but for rounding at silhouettes, where some 20 of the 8192 part: a difference with a
     // standard deviation of sqrt(20) times half the radiance, 7e-4 of the sum, and four of these.
     let (gpu, cpu) = (
-        mean(&render_gpu(&scene, &many)),
-        mean(&render_cpu(&scene, &many)),
+        mean(&means(&render_gpu(&scene, &many))),
+        mean(&means(&render_cpu(&scene, &many))),
     );
     assert!(
         (gpu / cpu - 1.0).abs() < 2.8e-3,
@@ -102,7 +97,7 @@ fn a_path_longer_than_any_dispatch_is_an_error_or_right() {
     endless.max_bounces = 65_535;
     match render_quietly(&mut gpu_renderer(&scene, &endless), &endless) {
         // A driver without such a limit.
-        Ok(outcome) => assert_eq!(mean(&outcome.film), 65_536.0),
+        Ok(outcome) => assert_eq!(mean(&means(&outcome.film)), 65_536.0),
         Err(Error::Gpu(text)) => assert!(text.contains("--max-bounces"), "{text}"),
         Err(other) => panic!("{other}"),
     }

@@ -13,7 +13,7 @@ use gpu_trace::materials::luminance;
 use gpu_trace::placement::Placement;
 use gpu_trace::placement::sky::{Band, SkyTable};
 use gpu_trace::reference::light::environment::{sky_place, sky_radiance};
-use gpu_trace::reference::light::skylight::{part_of, sample_sky, sky_density};
+use gpu_trace::reference::light::skylight::{part_of, sample_sky, sky_pdf};
 use gpu_trace::reference::path::PathTracer;
 use gpu_trace::scene::{Environment, Scene, Sky};
 use gpu_trace::settings::{GeometryChoice, Integrator, LightSampling, Settings};
@@ -21,6 +21,7 @@ use gpu_trace::statistics::{chi_square, mean_and_error};
 use gpu_trace::verify::{Agreement, Random, ULP, means, settings, share_off, vector};
 
 use super::{ball_text, directions, in_sky, mean_over_cosine, random_image, seen};
+use crate::common::images::{assert_alike, bias};
 use crate::common::{gpu, probe_of, render_cpu, render_gpu, scene};
 
 /// A dim image of small numbers with a hot texel.
@@ -88,14 +89,12 @@ fn direction_in(sky: &Sky, (column, row): (u32, u32), part: [f64; 2]) -> DVec3 {
 }
 
 #[test]
-fn the_table_is_a_density_and_positive_where_light_comes_from() {
+fn the_table_is_a_pdf_and_positive_where_light_comes_from() {
     for (name, sky) in skies() {
         let table = SkyTable::new(&sky);
         let (width, height) = (sky.image().width, sky.image().height);
         let angle = |row| Band::of(row, height).solid_angle() / f64::from(width);
-        let sum: f64 = cells(&sky)
-            .map(|(c, r)| table.density(c, r) * angle(r))
-            .sum();
+        let sum: f64 = cells(&sky).map(|(c, r)| table.pdf(c, r) * angle(r)).sum();
         // Two roundings to f32 of each.
         assert!((sum - 1.0).abs() < 2.0 * ULP, "{name}: {sum}");
         let all: f64 = (0..height)
@@ -109,8 +108,7 @@ fn the_table_is_a_density_and_positive_where_light_comes_from() {
                 all.map(|part| sky_radiance(&sky, sky_place(&sky, direction_in(&sky, cell, part))))
                     .fold(0.0, |most: f64, radiance| most.max(radiance.max_element()))
             };
-            let lost =
-                |cell: &(u32, u32)| table.density(cell.0, cell.1) == 0.0 && seen(*cell) > 0.0;
+            let lost = |cell: &(u32, u32)| table.pdf(cell.0, cell.1) == 0.0 && seen(*cell) > 0.0;
             cells(&sky).filter(lost).count()
         };
         assert_eq!(dark(&table), 0, "{name}");
@@ -118,7 +116,7 @@ fn the_table_is_a_density_and_positive_where_light_comes_from() {
             // Companion: by the texels' own values it lacks what interpolation shows of their neighbours.
             assert!(dark(&by_their_own(&sky)) > 0);
             // Black is not looked for.
-            assert!(cells(&sky).any(|(c, r)| table.density(c, r) == 0.0));
+            assert!(cells(&sky).any(|(c, r)| table.pdf(c, r) == 0.0));
         }
     }
 }
@@ -164,7 +162,7 @@ fn parts_are_exact() {
 }
 
 #[test]
-fn directions_are_drawn_by_their_density() {
+fn directions_are_drawn_by_their_pdf() {
     let mut random = Random::new("directions to skies");
     let mut p_values = Vec::new();
     for (name, sky) in skies() {
@@ -179,7 +177,7 @@ fn directions_are_drawn_by_their_density() {
         let mut wanted = vec![0.0; counts.len()];
         for (cell, (column, row)) in cells(&sky).enumerate() {
             let angle = Band::of(row, image.height).solid_angle() / f64::from(image.width);
-            let all = table.density(column, row) * angle;
+            let all = table.pdf(column, row) * angle;
             wanted[4 * cell..4 * cell + 4].fill(0.25 * all);
         }
         let mut agreement = Agreement::default();
@@ -234,7 +232,7 @@ fn densities_agree_where_paths_arrive() {
         let table = SkyTable::new(&sky);
         let inputs = directions(50_000, "densities");
         let outputs: Vec<[f32; 4]> = probe_of(&in_sky(sky.clone(), ""), &["sky", "skylight"])
-            .call("sky_density", &inputs)
+            .call("sky_pdf", &inputs)
             .expect("the probe runs");
         let holds = |table: &SkyTable| {
             let mut agreement = Agreement::default();
@@ -244,7 +242,7 @@ fn densities_agree_where_paths_arrive() {
                 let off = (place - place.round()).abs();
                 let may_be = 8.0 * ULP * f64::from(sky.image().width.max(sky.image().height));
                 if off.min_element() > may_be && (w[0] != 0.0 || w[2] != 0.0) {
-                    let truth = sky_density(&sky, table, place);
+                    let truth = sky_pdf(&sky, table, place);
                     let error = (f64::from(found[0]) - truth).abs();
                     agreement.add(error, ULP * truth + f64::MIN_POSITIVE, || {
                         format!("{name}, {w:?}: {found:?} for {truth}")
@@ -421,26 +419,11 @@ fn rendered(scene: &Scene, how: (Integrator, LightSampling, GeometryChoice), spp
     let (integrator, light_sampling, geometry) = how;
     let settings = Settings {
         integrator,
-        light_sampling,
+        light_sampling: integrator.samples_lights().then_some(light_sampling),
         geometry,
         ..settings(scene, 24, 18, spp)
     };
     render_gpu(scene, &settings)
-}
-
-/// Deviations by which the means of two independent films differ.
-fn apart(a: &Film, b: &Film, scale: f64) -> f64 {
-    let mean = |film: &Film| mean_and_error(&means(film)).0;
-    let variance = |film: &Film| -> f64 {
-        let pixels = 0..film.rect().pixels();
-        // The channels of a pixel go together: their deviations add.
-        let all = pixels.map(|i| film.variance_of_mean(i).expect("batches"));
-        let sum: f64 = all
-            .map(|v| v.iter().map(|v| v.sqrt()).sum::<f64>().powi(2))
-            .sum();
-        sum / (3.0 * film.rect().pixels() as f64).powi(2)
-    };
-    (scale * mean(a) - mean(b)) / (variance(a) + variance(b)).sqrt()
 }
 
 #[test]
@@ -463,18 +446,13 @@ fn all_estimators_converge_to_the_same() {
         for integrator in [Integrator::Path, Integrator::Nee] {
             let geometry = geometries[lamps % 3];
             let film = rendered(&scene, (integrator, sampling, geometry), 1 << 9);
-            let z = apart(&film, &reference, 1.0);
-            eprintln!(
-                "{lamps} lamps, {sampling:?}, {}: z = {z:.2}",
-                integrator.name()
-            );
-            assert!(
-                z.abs() < 3.9,
-                "{lamps} lamps, {sampling:?}, {integrator:?}: {z}"
-            );
+            let name = format!("{lamps} lamps, {sampling:?}, {}", integrator.name());
+            let (z, _) = bias(&film, &reference, 1.0);
+            eprintln!("{name}: z = {z:.2}");
+            assert_alike(&name, &film, &reference, z.abs() < 3.9, z);
             assert_eq!(film.tally().non_finite, 0);
             // Companion: 2 % too dark.
-            let z = apart(&film, &reference, 0.98);
+            let (z, _) = bias(&film, &reference, 0.98);
             assert!(z.abs() > 3.9, "2 % is not found: {z}");
         }
     }
@@ -492,7 +470,7 @@ fn every_geometry_has_the_same_paths_as_the_reference() {
         for integrator in [Integrator::Path, Integrator::Nee] {
             let of = |geometry| Settings {
                 integrator,
-                light_sampling: sampling,
+                light_sampling: Some(sampling),
                 geometry,
                 ..settings(&scene, 24, 18, 4)
             };
@@ -505,10 +483,8 @@ fn every_geometry_has_the_same_paths_as_the_reference() {
                 let film = render_gpu(&scene, &of(geometry));
                 let off = share_off(&film, &reference);
                 // A path in a hundred takes another way, where a rounding decides; a pixel has four.
-                assert!(
-                    off < 0.05,
-                    "{lamps} lamps, {integrator:?}, {geometry:?}: {off}"
-                );
+                let name = format!("{lamps} lamps, {integrator:?}, {geometry:?}");
+                assert_alike(&name, &film, &reference, off < 0.05, off);
                 let rays = film.tally().rays as f64 / reference.tally().rays as f64;
                 assert!((rays - 1.0).abs() < 0.01, "{rays}");
             }

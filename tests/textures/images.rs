@@ -10,6 +10,7 @@ use gpu_trace::statistics::mean_and_error;
 use gpu_trace::verify::{ULP, image_bits, means, settings, share_off};
 
 use super::{albedo, emission, image, random_picture};
+use crate::common::images::{assert_alike, largest_relative_difference, mean};
 use crate::common::{render_cpu, render_gpu, scene, scene_file};
 
 const CAMERA: &str = "[camera]\nposition = [0, 0, 4]\nlook_at = [0, 0, 0]\nfov = 40.0\n[image]\nwidth = 16\nheight = 16\n";
@@ -29,11 +30,6 @@ fn with_albedo(scene: &Scene, texture: Texture) -> Scene {
     let mut scene = scene.clone();
     scene.materials[0] = scene.materials[0].clone().with_texture(albedo(), texture);
     scene
-}
-
-fn off(a: &Film, b: &Film) -> f64 {
-    let pairs = std::iter::zip(means(a), means(b));
-    pairs.map(|(a, b)| (a - b).abs() / b).fold(0.0, f64::max)
 }
 
 #[test]
@@ -65,27 +61,29 @@ fn constant_textures_are_plain_colours() {
         };
         let plain = render_gpu(&base, &settings);
         let checker = textured(Texture::Checker { values, size: 0.5 });
-        assert_eq!(
-            image_bits(&render_gpu(&checker, &settings)),
-            image_bits(&plain),
-            "{geometry:?}"
-        );
+        let name = format!("{geometry:?}");
+        let found = render_gpu(&checker, &settings);
+        let same = image_bits(&found) == image_bits(&plain);
+        assert_alike(&name, &found, &plain, same, "other bits");
         let picture = Picture::new(5, 3, vec![color.to_array(); 15]);
         // An interpolation has three roundings, of which there are three, at each of a few events.
         let constant = textured(image(picture, DVec3::X));
-        let found = off(&render_gpu(&constant, &settings), &plain);
-        assert!(found < 1.0e-5, "{geometry:?}: {found:e}");
+        let film = render_gpu(&constant, &settings);
+        let off = largest_relative_difference(&film, &plain);
+        assert_alike(&name, &film, &plain, off < 1.0e-5, off);
         let noise = textured(Texture::Noise {
             values,
             size: 0.5,
             octaves: 3,
         });
-        let found = off(&render_gpu(&noise, &settings), &plain);
-        assert!(found < 1.0e-5, "{geometry:?}: {found:e}");
+        let film = render_gpu(&noise, &settings);
+        let off = largest_relative_difference(&film, &plain);
+        assert_alike(&name, &film, &plain, off < 1.0e-5, off);
         // Companion: a hundredth brighter.
         let picture = Picture::new(5, 3, vec![(1.01 * color).to_array(); 15]);
         let other = textured(image(picture, DVec3::X));
-        assert!(off(&render_gpu(&other, &settings), &plain) > 1.0e-3);
+        let film = render_gpu(&other, &settings);
+        assert!(largest_relative_difference(&film, &plain) > 1.0e-3);
     }
 }
 
@@ -183,12 +181,11 @@ fn brightness(scene: &Scene, integrator: Integrator, light_sampling: LightSampli
     let each = (0..8).map(|seed| {
         let settings = Settings {
             integrator,
-            light_sampling,
+            light_sampling: integrator.samples_lights().then_some(light_sampling),
             seed,
             ..settings(scene, 16, 16, 256)
         };
-        let means = means(&render_gpu(scene, &settings));
-        means.iter().sum::<f64>() / means.len() as f64
+        mean(&means(&render_gpu(scene, &settings)))
     });
     mean_and_error(&each.collect::<Vec<_>>())
 }
@@ -259,12 +256,12 @@ fn a_constant_lamp_is_a_plain_one() {
         render_gpu(&textured, &settings),
         render_gpu(&plain, &settings),
     );
-    let found = off(&a, &b);
-    assert!(found < 64.0 * ULP, "{found:e}");
+    let off = largest_relative_difference(&a, &b);
+    assert_alike("a constant lamp", &a, &b, off < 64.0 * ULP, off);
     // Companion: a hundredth brighter.
     let picture = Picture::new(3, 2, vec![[4.04; 3]; 6]);
     let other = lit_by(Some(image(picture, DVec3::Z)), "");
-    assert!(off(&render_gpu(&other, &settings), &b) > 64.0 * ULP);
+    assert!(largest_relative_difference(&render_gpu(&other, &settings), &b) > 64.0 * ULP);
 }
 
 /// A ground of radius 10^6 just below a camera, and a ball on it.
@@ -300,10 +297,12 @@ fn a_huge_ground_is_that_of_f64() {
                 ..settings(&scene, 32, 32, 16)
             };
             let film = render_gpu(&scene, &settings);
-            let off = share_off(&film, &render_cpu(&scene, &settings));
-            eprintln!("{geometry:?}: {off}");
+            let reference = render_cpu(&scene, &settings);
+            let off = share_off(&film, &reference);
+            let name = format!("a ground, {geometry:?}");
+            eprintln!("{name}: {off}");
             // Rays whose point is next to a border, or far beyond the pole.
-            assert!(off < 0.03, "{off}");
+            assert_alike(&name, &film, &reference, off < 0.03, off);
             // Companion: f32 has no digits for where the cells are, a sixteenth of a scene unit; by less than that.
             let moved = ground(texture.clone(), 0.03);
             let other = share_off(&film, &render_cpu(&moved, &settings));
@@ -331,9 +330,10 @@ fn a_roughness_may_be_smooth_in_places() {
         let scene = scene(&text(kind));
         let settings = settings(&scene, 24, 24, 16);
         let film = render_gpu(&scene, &settings);
-        let off = share_off(&film, &render_cpu(&scene, &settings));
+        let reference = render_cpu(&scene, &settings);
+        let off = share_off(&film, &reference);
         eprintln!("{kind}: {off}");
-        assert!(off < 0.06, "{off}");
+        assert_alike(kind, &film, &reference, off < 0.06, off);
         let mut rough = scene.clone();
         rough.materials[0].textures.clear();
         let other = share_off(&film, &render_cpu(&rough, &settings));

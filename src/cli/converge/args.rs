@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use clap::Args;
 
-use crate::backend::BackendChoice;
+use crate::backend::{BackendChoice, BackendKind};
 use crate::cli::choices::{self, Wanted};
 use crate::cli::values;
 use crate::output::ProgressMode;
@@ -178,7 +178,11 @@ impl ConvergeArgs {
     pub(super) fn choice(&self, wanted: Wanted) -> BackendChoice<'_> {
         BackendChoice {
             kind: wanted.kind(),
-            device: self.device.as_deref(),
+            // Of several backends those that have devices.
+            device: self
+                .device
+                .as_deref()
+                .filter(|_| wanted.kind() != Some(BackendKind::Cpu)),
             threads: self.threads.map_or(0, usize::from),
         }
     }

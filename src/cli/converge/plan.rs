@@ -6,17 +6,17 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::args::ConvergeArgs;
-use crate::backend::{Backend, BackendKind, LEAST_PIXEL_BYTES, check_memory};
+use crate::backend::{Backend, BackendKind};
 use crate::cli::choices::Wanted;
 use crate::error::{Action, Error, Result};
-use crate::image::Format;
 use crate::input::{Input, read};
 use crate::job::prepare;
+use crate::memory::{LEAST_PIXEL_BYTES, check_memory};
 use crate::sampler::Sampler;
 use crate::scene::{Loaded, builtin};
 use crate::settings::{DEFAULT_TERMINATION, Integrator, Offset, Rect, Settings};
 use crate::study::identity::{Identity, ReferenceIdentity, hash, kernel_hash};
-use crate::study::plan::{ReferenceChoice, Study};
+use crate::study::plan::{ReferenceChoice, Study, check_cache, check_reference};
 use crate::study::presets::{Preset, preset};
 use crate::study::run::Length;
 use crate::study::series::{Series, Subject, product};
@@ -86,15 +86,12 @@ pub(super) fn plan(args: &ConvergeArgs, warnings: &mut Vec<String>) -> Result<Pl
     for series in series {
         let settings = series.settings(&base, args.seed);
         let job = prepare(&loaded.scene, &settings)?;
-        if let Some(why) = job.cache_obstacle() {
-            if args.radiance_cache.is_empty() {
+        match job.cache_obstacle() {
+            Some(why) if args.radiance_cache.is_empty() => {
                 warnings.push(format!("no radiance cache: {why}"));
                 continue;
             }
-            return Err(Error::Usage(format!(
-                "--radiance-cache on: {} cannot have one: {why}",
-                loaded.name
-            )));
+            _ => check_cache(&loaded, &job)?,
         }
         if let Entry::Vacant(kernel) = kernels.entry(series.way()) {
             kernel.insert(kernel_hash(&job)?);
@@ -350,8 +347,7 @@ fn own_reference(
     (ReferenceChoice::Own { series, spp, seed }, identity)
 }
 
-/// The reference in a file, and the hash of its bytes. Refuses what is not of this scene and size, with
-/// both facts, and what shares samples with the runs.
+/// The reference in a file, and the hash of its bytes.
 fn reference_file(
     path: &Path,
     loaded: &Loaded,
@@ -359,42 +355,7 @@ fn reference_file(
     seeds: &std::ops::Range<u64>,
 ) -> Result<(Input, String)> {
     let input = read(path)?;
-    let (shown, picture) = (path.display(), &input.picture);
-    if (picture.width, picture.height) != (base.width, base.height) {
-        let there = format!("{}x{}", picture.width, picture.height);
-        return Err(Error::Usage(format!(
-            "the sizes differ: {shown} has {there} pixels, the study {}x{}; if it shows the whole image, \
-             add --size {there}",
-            base.width, base.height
-        )));
-    }
-    if input.format == Format::Png {
-        return Err(Error::Usage(format!(
-            "{shown} is a PNG file, which holds nothing above 1 and rounds the rest: use EXR or NPY"
-        )));
-    }
-    let about = |name: &str| input.about.get(name).map(String::as_str);
-    if let Some(there) = about("scene_hash").filter(|there| *there != loaded.hash) {
-        let scene = about("scene").unwrap_or("?").escape_debug().to_string();
-        return Err(Error::Usage(format!(
-            "the scenes differ: {shown} shows {scene} ({}), the study is of {} ({})",
-            there.escape_debug(),
-            loaded.name,
-            loaded.hash
-        )));
-    }
-    if let Some(seed) = about("seed")
-        .and_then(|s| s.parse::<u64>().ok())
-        .filter(|s| seeds.contains(s))
-    {
-        return Err(Error::Usage(format!(
-            "{shown} was rendered with seed {seed}, and the study has seeds {} to {}: both would share \
-             samples; choose others with --seed, as in --seed {}",
-            seeds.start,
-            seeds.end - 1,
-            seed.wrapping_add(1)
-        )));
-    }
+    check_reference(&input, loaded, base, seeds)?;
     let bytes = fs::read(path).map_err(|source| Error::File {
         action: Action::Read,
         path: path.to_owned(),

@@ -71,7 +71,7 @@ pub(super) fn about(
         format: FORMAT,
         makers: vec![maker],
         scene: SceneRecord::of(&request.loaded)?,
-        settings: Choices::of(settings),
+        settings: Choices::of(settings)?,
         goal,
         ranges: Vec::new(),
         samples: Vec::new(),

@@ -21,11 +21,14 @@ use self::session::Session;
 use self::summary::{not_finite, summary};
 use super::args::RenderArgs;
 use super::print;
-use crate::backend::{LEAST_PIXEL_BYTES, check_memory};
 use crate::error::{Error, Result};
-use crate::image::{Format, Picture};
+use crate::film_file;
+use crate::image::Picture;
 use crate::job::{Job, prepare};
-use crate::output::{Contents, Layer, Plane, Stats, Target, atomic, check_all, write_all};
+use crate::memory::{LEAST_PIXEL_BYTES, check_memory};
+use crate::output::{
+    Contents, Layer, Plane, Stats, Target, atomic, check_all, check_layers, write_all,
+};
 use crate::render::Outcome;
 use crate::scene::load::Loaded;
 
@@ -94,22 +97,13 @@ fn request(args: &RenderArgs, loaded: Loaded) -> Result<Request> {
             .map(Target::parse)
             .collect::<Result<_>>()?
     };
-    if !args.aov.is_empty() && !targets.iter().any(|t| t.format == Format::Exr) {
-        return Err(Error::Usage(
-            "--aov: only EXR files have room for layers: add an output such as -o image.exr".into(),
-        ));
-    }
+    check_layers(&args.aov, &targets)?;
     let mut outputs: Vec<&Path> = targets.iter().map(|t| t.path.as_path()).collect();
     outputs.extend(args.stats.as_deref());
     outputs.extend(args.dump_wgsl.as_deref());
     outputs.extend(args.checkpoint.as_deref());
     if let Some(path) = &args.checkpoint {
-        if let Some(view) = args.view {
-            return Err(Error::Usage(format!(
-                "--checkpoint keeps light, and --view {} is none",
-                view.name()
-            )));
-        }
+        film_file::check(&settings)?;
         checkpoint::check_new(path)?;
     }
     check_all(&outputs, &loaded.inputs())?;

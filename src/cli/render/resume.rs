@@ -8,7 +8,7 @@ use clap::{Args, ValueEnum as _};
 use super::Request;
 use super::display::Series;
 use super::session::Session;
-use crate::backend::{BackendKind, LEAST_PIXEL_BYTES, check_memory};
+use crate::backend::{BackendChoice, BackendKind};
 use crate::cli::args::RenderArgs;
 use crate::cli::choices::{self, Wanted};
 use crate::cli::fault::Fault;
@@ -17,6 +17,7 @@ use crate::error::{Error, Result};
 use crate::film::{Estimate, Film, LEAST_SAMPLES};
 use crate::film_file::{self, About, Command, FilmFile};
 use crate::job::{Job, prepare};
+use crate::memory::{LEAST_PIXEL_BYTES, check_memory};
 use crate::output::{Aov, ProgressMode, Target, check_all};
 use crate::render::{Begun, StoppedBy, estimate, has_all};
 use crate::settings::{MAXIMUM_SPP, Settings};
@@ -193,11 +194,12 @@ fn render_args(args: &ResumeArgs, about: &About) -> Result<RenderArgs> {
     let before = about.makers.last().map(|maker| Wanted::Only(maker.backend));
     let backend = args.backend.or(before).unwrap_or(Wanted::Auto);
     let on_gpu = backend != Wanted::Only(BackendKind::Cpu);
-    if args.device.is_some() && !on_gpu {
-        return Err(Error::Usage(
-            "--device chooses a GPU, --backend cpu uses none".into(),
-        ));
-    }
+    let choice = BackendChoice {
+        kind: backend.kind(),
+        device: args.device.as_deref(),
+        threads: 0,
+    };
+    choice.check()?;
     Ok(RenderArgs {
         output: match args.output.is_empty() {
             true => outputs.into_iter().map(PathBuf::from).collect(),

@@ -41,7 +41,7 @@ pub(super) fn statistics(
         sampler: settings.sampler.name().into(),
         max_bounces: settings.max_bounces,
         radiance_cache: job.cells().is_some(),
-        roulette: settings.roulette,
+        roulette: settings.has_roulette(),
         seconds: Seconds::default(),
         samples,
         paths_per_second: samples as f64 / outcome.elapsed.as_secs_f64(),

@@ -19,13 +19,13 @@ use super::choices::{Caching, Estimator, Wanted};
 use super::format::{duration, percent};
 use super::signals::Signals;
 use super::{print, values};
-use crate::backend::{Backend, BackendChoice, BackendKind, LEAST_PIXEL_BYTES, check_memory};
+use crate::backend::{Backend, BackendChoice, BackendKind};
 use crate::error::{Action, Error, Result};
 use crate::film::cut;
 use crate::forecast;
-use crate::image::Format;
 use crate::job::{Job, prepare};
-use crate::output::{Progress, Target, check_all};
+use crate::memory::{LEAST_PIXEL_BYTES, check_memory};
+use crate::output::{Progress, Target, check_all, check_layers};
 use crate::scene::Loaded;
 use crate::scene::load::Source;
 use crate::settings::MAXIMUM_SPP;
@@ -246,11 +246,7 @@ fn targets(args: &SlurmArgs, loaded: &Loaded) -> Result<Vec<Target>> {
         true => vec![Target::parse(format!("{}.png", loaded.name))?],
         false => typed.iter().map(Target::parse).collect::<Result<_>>()?,
     };
-    if !args.render.aov.is_empty() && !targets.iter().any(|t| t.format == Format::Exr) {
-        return Err(Error::Usage(
-            "--aov: only EXR files have room for layers: add an output such as -o image.exr".into(),
-        ));
-    }
+    check_layers(&args.render.aov, &targets)?;
     Ok(targets)
 }
 

@@ -29,7 +29,7 @@ const MOST: f64 = 0.98;
 /// Grazing incidence, where the lobe is of no use for its share at 0.
 const GRAZING: f64 = 0.02;
 
-/// Of the densities that a table is looked at with.
+/// Of the pdfs that a table is looked at with.
 const ALPHAS: [f64; 5] = [0.002, 0.01, 0.05, 0.2, 0.6];
 const POINTS: u32 = 256;
 
@@ -42,7 +42,7 @@ const HALVINGS: u32 = 24;
 /// A direction at which the table is looked at.
 struct Point {
     pair: Pair,
-    /// The square of f cos by luminance, over the density with which the direction was drawn.
+    /// The square of f cos by luminance, over the pdf with which the direction was drawn.
     square: f64,
 }
 
@@ -53,17 +53,17 @@ struct Incidence {
     albedo: DVec3,
 }
 
-fn density(pair: &Pair, alpha: f64) -> f64 {
+fn lobe_pdf(pair: &Pair, alpha: f64) -> f64 {
     ggx_pdf(pair.o, pair.h, DVec2::splat(alpha))
 }
 
-fn cosine_density(pair: &Pair) -> f64 {
+fn cosine_pdf(pair: &Pair) -> f64 {
     FRAC_1_PI * pair.i.z
 }
 
 impl Incidence {
     /// Looks at f where o makes that cosine, by evenly spread numbers (Roberts, "The Unreasonable Effectiveness of
-    /// Quasirandom Sequences", 2018) through the cosine's density and those of lobes from narrow to wide.
+    /// Quasirandom Sequences", 2018) through the cosine's pdf and those of lobes from narrow to wide.
     fn of(f: &impl Fn(&Pair) -> DVec3, cosine: f64) -> Self {
         // Powers of the inverse of the root of x^3 = x + 1.
         const STEP: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3];
@@ -81,8 +81,8 @@ impl Incidence {
         let mut albedo = DVec3::ZERO;
         let mut points = Vec::new();
         for pair in drawn.filter(|pair| pair.i.z > 0.0) {
-            let lobes: f64 = ALPHAS.iter().map(|alpha| density(&pair, *alpha)).sum();
-            let drawn = (cosine_density(&pair) + lobes) / (1 + ALPHAS.len()) as f64;
+            let lobes: f64 = ALPHAS.iter().map(|alpha| lobe_pdf(&pair, *alpha)).sum();
+            let drawn = (cosine_pdf(&pair) + lobes) / (1 + ALPHAS.len()) as f64;
             let f_cos = pair.i.z * f(&pair);
             albedo += f_cos / drawn / count;
             points.push(Point {
@@ -96,17 +96,17 @@ impl Incidence {
     /// The lobe's share with which the second moment of a sample's weight is least, and that moment, but for a factor
     /// that is the same for all alphas.
     fn best(&self, alpha: f64) -> (f64, f64) {
-        let densities: Vec<[f64; 3]> = self
+        let pdfs: Vec<[f64; 3]> = self
             .points
             .iter()
             .map(|point| {
-                let cosine = cosine_density(&point.pair);
-                [point.square, cosine, density(&point.pair, alpha) - cosine]
+                let cosine = cosine_pdf(&point.pair);
+                [point.square, cosine, lobe_pdf(&point.pair, alpha) - cosine]
             })
             .collect();
         // It is convex in the share.
         let rises = |share: f64| {
-            let slopes = densities
+            let slopes = pdfs
                 .iter()
                 .map(|[square, cosine, more]| -square * more / (cosine + share * more).powi(2));
             slopes.sum::<f64>() > 0.0
@@ -120,7 +120,7 @@ impl Incidence {
                 low = middle;
             }
         }
-        let moments = densities
+        let moments = pdfs
             .iter()
             .map(|[square, cosine, more]| square / (cosine + high * more));
         // Where none at all is best.

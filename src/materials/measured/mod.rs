@@ -160,6 +160,11 @@ impl Bsdf for Measured {
         self
     }
 
+    fn lacking(&self) -> Option<&'static str> {
+        let is_there = self.table.is_some();
+        (!is_there).then_some("the table of a measured material has not been read")
+    }
+
     fn table(&self) -> Option<&Arc<BrdfTable>> {
         self.table.as_ref()
     }

@@ -37,7 +37,7 @@ pub fn sample_sky(sky: &Sky, table: &SkyTable, u: [f64; 4]) -> LightSample {
     };
     let turn = (f64::from(column) + across) / f64::from(width) + sky.rotation() / 360.0;
     let p = 2.0 * (s * (1.0 - s)).sqrt() * circle_point(turn);
-    let pdf = table.density(column, row);
+    let pdf = table.pdf(column, row);
     LightSample {
         wi: DVec3::new(p.y, y, -p.x),
         pdf,
@@ -48,10 +48,10 @@ pub fn sample_sky(sky: &Sky, table: &SkyTable, u: [f64; 4]) -> LightSample {
     }
 }
 
-/// The density with which light sampling finds a direction at this place of the image.
+/// The pdf with which light sampling finds a direction at this place of the image.
 #[must_use]
-pub fn sky_density(sky: &Sky, table: &SkyTable, place: DVec2) -> f64 {
+pub fn sky_pdf(sky: &Sky, table: &SkyTable, place: DVec2) -> f64 {
     let within = |x: f64, count: u32| (x as u32).min(count - 1);
     let image = sky.image();
-    table.density(within(place.x, image.width), within(place.y, image.height))
+    table.pdf(within(place.x, image.width), within(place.y, image.height))
 }

@@ -298,7 +298,7 @@ impl<'a> Draw<'a> {
     #[must_use]
     pub fn energy(&self) -> Energy {
         let weighed = |channel: usize| -> Vec<f64> {
-            let of = |s: &Sampled| s.weight()[channel] * compression(s.event, s.eta.into());
+            let of = |s: &Sampled| s.weight()[channel] * eta_scale(s.event, s.eta.into());
             self.samples.iter().map(of).collect()
         };
         let drawn = [0, 1, 2].map(|channel| mean_and_error(&weighed(channel)));
@@ -350,7 +350,7 @@ impl<'a> Draw<'a> {
         let mut sum = DVec3::ZERO;
         for _ in 0..self.samples.len() {
             let s = kind.sample(&self.surface, self.wo, random.unit4().map(f64::from));
-            let weight = s.weight * compression(s.event.bits(), s.eta);
+            let weight = s.weight * eta_scale(s.event.bits(), s.eta);
             sum += DVec3::from(weight.to_array().map(|w| w.powi(k)));
         }
         (sum / self.samples.len() as f64).to_array()
@@ -393,7 +393,7 @@ fn is_beyond(surface: &Surface, w: DVec3) -> bool {
 }
 
 /// What refraction takes out of a weight.
-fn compression(event: u32, eta: f64) -> f64 {
+fn eta_scale(event: u32, eta: f64) -> f64 {
     if event & Event::TRANSMITTED.bits() == 0 {
         1.0
     } else {
