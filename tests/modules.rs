@@ -41,7 +41,7 @@ impl Sources {
         for end in 1..=names.len() {
             self.modules.insert(names[..end].to_vec());
         }
-        let reader = Reader {
+        let mut reader = Reader {
             file: format!("src/{}", file.display()),
             sources: self,
         };
@@ -108,17 +108,15 @@ fn names_of(file: &Path) -> Names {
     names
 }
 
+/// Reads one file.
 struct Reader<'a> {
+    /// As messages name it.
     file: String,
     sources: &'a mut Sources,
 }
 
 impl Reader<'_> {
-    fn read(mut self, tokens: TokenStream, module: &[String]) {
-        self.tokens(tokens, module);
-    }
-
-    fn tokens(&mut self, tokens: TokenStream, module: &[String]) {
+    fn read(&mut self, tokens: TokenStream, module: &[String]) {
         let tokens: Vec<TokenTree> = tokens.into_iter().collect();
         let mut at = 0;
         // Whether what follows is re-exported.
@@ -130,8 +128,8 @@ impl Reader<'_> {
             }
             match token {
                 TokenTree::Group(group) => match inline_module(&tokens[..at]) {
-                    Some(name) => self.tokens(group.stream(), &child(module, &name)),
-                    None => self.tokens(group.stream(), module),
+                    Some(name) => self.read(group.stream(), &child(module, &name)),
+                    None => self.read(group.stream(), module),
                 },
                 TokenTree::Ident(word) if word == "use" => {
                     exported = at > 0 && is_visibility(&tokens[..at]);
