@@ -1,6 +1,7 @@
 //! Environments that are not the same everywhere: lookups against their f64 twins, and images against
 //! quadrature.
 
+mod estimators;
 mod files;
 mod gradient;
 mod image;
