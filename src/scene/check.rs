@@ -60,8 +60,8 @@ fn properties(table: &str) -> &'static Schema {
 }
 
 fn number(name: &str, schema: &Schema, number: f64) -> Fine {
-    let limits = Limits::of(schema).rounded();
-    if limits.hold(number) && number.is_finite() {
+    let limits = Limits::of(schema);
+    if limits.rounded().hold(number) && number.is_finite() {
         return Ok(());
     }
     let wanted = limits.wanted(number);
