@@ -163,7 +163,7 @@ const PARTLY: [(&str, &[&str]); 14] = [
         "sky",
         &[
             "densities_agree_where_paths_arrive",
-            "directions_are_drawn_by_their_density",
+            "directions_are_drawn_by_their_pdf",
             "every_geometry_has_the_same_paths_as_the_reference",
             "gradients_agree",
             "images_agree_with_the_reference",
