@@ -14,7 +14,6 @@ use crate::placement::{Placement, Side};
 use crate::reference::survey::survey;
 use crate::scene::{MAX_BOUNCES, MAX_SIDE, MAX_SPP, Scene};
 use crate::settings::{GeometryChoice, Integrator, Offset, Settings, TERMINATIONS, View};
-use crate::shader::steps::paths_at_most;
 use crate::variance::{VarianceReport, variance_class};
 
 /// What will be rendered: it has passed all checks.
@@ -43,7 +42,7 @@ pub fn prepare(scene: &Scene, settings: &Settings) -> Result<Job> {
     check_levels(&placement)?;
     check_magnitudes(scene, &placement)?;
     check_lens(scene, &placement)?;
-    let effects = effects_that_fit(scene, &placement, settings);
+    let effects = Effects::derive(scene, &placement, settings);
     check_view(settings, &effects)?;
     let placement = match effects.has(Effect::RadianceCache) {
         true => {
@@ -59,20 +58,6 @@ pub fn prepare(scene: &Scene, settings: &Settings) -> Result<Job> {
         settings: settings.clone(),
         placement,
     })
-}
-
-/// The effects, without a radiance cache whose pilot might take more loop iterations for a path than drivers stand.
-fn effects_that_fit(scene: &Scene, placement: &Placement, settings: &Settings) -> Effects {
-    let effects = Effects::derive(scene, placement, settings);
-    let fits = || paths_at_most(placement, &effects, settings.max_bounces) > 0;
-    if !effects.has(Effect::RadianceCache) || fits() {
-        return effects;
-    }
-    let without = Settings {
-        radiance_cache: false,
-        ..settings.clone()
-    };
-    Effects::derive(scene, placement, &without)
 }
 
 impl Job {
@@ -110,10 +95,8 @@ impl Job {
     #[must_use]
     pub fn cache_obstacle(&self) -> Option<&'static str> {
         let is_asked_for = self.settings.radiance_cache && self.cells().is_none();
-        let too_long = "paths whose loops may take more iterations than drivers allow";
-        let why =
-            || cache_obstacle(&self.scene, &self.placement, &self.settings).unwrap_or(too_long);
-        is_asked_for.then(why)
+        let why = || cache_obstacle(&self.scene, &self.placement, &self.settings);
+        is_asked_for.then(why).flatten()
     }
 
     /// What is known of a sample's variance.

@@ -9,7 +9,7 @@ pub const PILOT: u64 = 1 << 48;
 pub enum Sampler {
     /// Each by itself: `core/random`.
     Independent,
-    /// In scrambles of a Sobol' sequence: `core/sobol`.
+    /// In scrambles of a Sobol' sequence: `sampler/sobol`.
     #[default]
     Sobol,
 }

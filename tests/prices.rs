@@ -183,15 +183,20 @@ fn unused_effects_change_no_image() {
 }
 
 fn measured(scene: &str, parts: usize) -> PriceList {
+    measured_with(scene, parts, |_| {})
+}
+
+fn measured_with(scene: &str, parts: usize, change: impl Fn(&mut Settings)) -> PriceList {
     let mut warnings = Vec::new();
     let backend = Backend::open(&BackendChoice::default(), &mut warnings).expect("a device");
     let scene = builtin::resolve(Some(scene)).expect("a scene").scene;
-    let settings = Settings {
+    let mut settings = Settings {
         width: 16,
         height: 16,
         crop: Rect::whole(16, 16),
         ..Settings::for_scene(&scene)
     };
+    change(&mut settings);
     let mut watch = Quiet { left: parts };
     measure(
         &backend,
@@ -246,4 +251,18 @@ fn what_was_measured_before_a_stop_is_kept() {
     let told = |price: &&Price| price.against.is_some() || price.forced.is_some();
     let told = list.prices.iter().filter(told).count();
     assert!((1..=3).contains(&told), "{told}");
+}
+
+/// Which has no radiance cache: what is measured is what is rendered.
+#[test]
+fn what_is_asked_for_without_effect_is_not_measured() {
+    let list = measured_with("lecture", 2, |settings| {
+        (settings.adaptive, settings.radiance_cache) = (true, true);
+    });
+    let reasons = |effect: Effect| {
+        let price = list.prices.iter().find(|price| price.effect == effect);
+        &price.expect("a row").reasons
+    };
+    assert!(!reasons(Effect::Adaptive).is_empty());
+    assert!(reasons(Effect::RadianceCache).is_empty());
 }

@@ -3,7 +3,7 @@
 //! That the kernel traces the reference's paths is in `agreement`, that any split gives the same bits in `claims`.
 
 use glam::DVec2;
-use gpu_trace::effects::{Effect, cache_obstacle};
+use gpu_trace::effects::{Effect, Effects, cache_obstacle};
 use gpu_trace::film::Film;
 use gpu_trace::gpu::renderer::GpuRenderer;
 use gpu_trace::job::Job;
@@ -14,6 +14,7 @@ use gpu_trace::render::render_quietly;
 use gpu_trace::sampler::Sampler;
 use gpu_trace::scene::Scene;
 use gpu_trace::settings::{GeometryChoice, Integrator, Offset, Settings, View};
+use gpu_trace::shader::steps::{LOOP_ITERATIONS, vertex_steps};
 use gpu_trace::statistics::mean_and_error;
 use gpu_trace::verify::{Random, settings};
 
@@ -422,39 +423,84 @@ fn it_is_off_where_it_would_not_be_right() {
     }
 }
 
-/// A pilot's loop does not look whether it has been ended, so a path of it that might be is none that it may have.
+/// A room of large spheres with the most lamps that are weighed, and a ball of a mix: a mirror and flaked paints.
+fn mixed_room(parts: usize) -> Scene {
+    let mut text = String::from(
+        "[camera]\nposition = [0, 0, 3]\nlook_at = [0, 0, 0]\nfov = 40\n[image]\nwidth = 8\nheight = 8\n\
+         [material.wall]\ntype = \"diffuse\"\nalbedo = [0.5, 0.5, 0.5]\n[material.glass]\ntype = \"dielectric\"\n\
+         ior = 1.5\n[material.lamp]\ntype = \"diffuse\"\nalbedo = [0, 0, 0]\nemission = [1, 1, 1]\n\
+         [material.paint0]\ntype = \"mirror\"\nreflectance = [0.9, 0.9, 0.9]\n",
+    );
+    for i in 1..parts {
+        text += &format!(
+            "[material.paint{i}]\ntype = \"car-paint\"\ndiffuse = [0.1, 0.1, 0.0{i}]\n\
+             specular = [[0.03, 0.03, 0.03], [0.05, 0.05, 0.05], [0, 0, 0]]\nf0 = [0.8, 0.8, 0.8]\n\
+             m = [0.4, 0.2, 0.1]\nclearcoat = {{ ior = 1.5 }}\n\
+             flakes = {{ density = 0.5, scale = 20.0, spread = 0.2, jitter = 0.5, color = [0.1, 0.1, 0.1] }}\n"
+        );
+    }
+    for i in 1..parts {
+        let rest = if i + 1 < parts { "mix" } else { "paint" };
+        let rest = format!("{rest}{}", if i + 1 < parts { i + 1 } else { 0 });
+        text += &format!(
+            "[material.mix{i}]\ntype = \"mix\"\nmaterials = [\"paint{i}\", \"{rest}\"]\nweight = 0.5\n"
+        );
+    }
+    let mut sphere = |[x, y, z]: [f64; 3], radius: f64, material: &str| {
+        text += &format!(
+            "[[sphere]]\ncenter = [{x:?}, {y:?}, {z:?}]\nradius = {radius:?}\nmaterial = \"{material}\"\n"
+        );
+    };
+    sphere([0.0; 3], 0.5, if parts > 1 { "mix1" } else { "paint0" });
+    sphere([0.0, 0.0, -2.0], 0.5, "glass");
+    for i in 0..8 {
+        sphere([f64::from(i), 6.0, 0.0], 0.2, "lamp");
+    }
+    for i in 0..54 {
+        sphere([0.0, -1.0e4 - 1.0 - f64::from(i), 0.0], 1.0e4, "wall");
+    }
+    scene(&text)
+}
+
+/// A pilot's loop does not look whether a driver has ended it, so a path of it must make fewer iterations than drivers
+/// stand, in the worst of all scenes that have a cache.
 #[test]
 fn a_pilots_path_fits_what_drivers_stand() {
-    // Flakes are looked for in 27 cells of a lattice for each part of a mix, and each loop over these.
-    let room = "[camera]\nposition = [0, 0, 3]\nlook_at = [0, 0, 0]\nfov = 40\n[image]\nwidth = 8\nheight = 8\n\
-                [material.wall]\ntype = \"diffuse\"\nalbedo = [0.5, 0.5, 0.5]\n[material.lamp]\ntype = \"diffuse\"\n\
-                albedo = [0, 0, 0]\nemission = [1, 1, 1]\n[[sphere]]\ncenter = [0, -101, 0]\nradius = 100\n\
-                material = \"wall\"\n[[sphere]]\ncenter = [0, 3, 0]\nradius = 1\nmaterial = \"lamp\"\n\
-                [[sphere]]\ncenter = [0, 0, 0]\nradius = 1\nmaterial = \"mix0\"\n";
-    let painted = |parts: usize| {
-        let mut text = room.to_owned();
-        for i in 0..=parts {
-            text += &format!(
-                "[material.paint{i}]\ntype = \"car-paint\"\ndiffuse = [0.1, 0.1, 0.0{}]\n\
-                 specular = [[0.03, 0.03, 0.03], [0.05, 0.05, 0.05], [0, 0, 0]]\nf0 = [0.8, 0.8, 0.8]\nm = [0.4, 0.2, 0.1]\n\
-                 flakes = {{ density = 0.5, scale = 20.0, spread = 0.2, jitter = 0.5, color = [0.1, 0.1, 0.1] }}\n",
-                i + 1
-            );
-        }
-        for i in 0..parts {
-            let rest = if i + 1 < parts { "mix" } else { "paint" };
-            text += &format!(
-                "[material.mix{i}]\ntype = \"mix\"\nmaterials = [\"paint{i}\", \"{rest}{}\"]\nweight = 0.5\n",
-                i + 1
-            );
-        }
-        let scene = scene(&text);
-        job(&scene, &cached(&scene, 8, 8, 16))
+    let iterations = |parts: usize| {
+        let scene = mixed_room(parts);
+        let settings = Settings {
+            geometry: GeometryChoice::List,
+            ..cached(&scene, 8, 8, 16)
+        };
+        let placement = Placement::new(&scene, 8, 8);
+        assert!(placement.poles > 50 && placement.lights.table.len() == 8);
+        let effects = Effects::derive(&scene, &placement, &settings);
+        let effects = effects.with(&[Effect::RadianceCache], "the worst case");
+        let steps = vertex_steps(&placement, &effects);
+        let why = cache_obstacle(&scene, &placement, &settings);
+        (
+            why,
+            (u64::from(settings.max_bounces) + 1) * u64::from(steps),
+        )
     };
-    let [few, many] = [1, 40].map(painted);
-    assert_eq!(few.cache_obstacle(), None);
-    assert!(few.effects().has(Effect::RadianceCache));
-    let why = many.cache_obstacle().expect("an obstacle");
-    assert!(why.contains("more iterations than drivers allow"), "{why}");
-    assert!(!many.effects().has(Effect::RadianceCache));
+    let (why, most) = iterations(4);
+    assert_eq!(why, None);
+    assert!(most <= LOOP_ITERATIONS, "{most}");
+    // Companion: beyond what has a cache it would not fit.
+    let (why, more) = iterations(8);
+    assert!(why.is_some_and(|why| why.contains("more than 4 materials")));
+    assert!(more > LOOP_ITERATIONS, "{more}");
+    // Without a mix there may be more bounces: the forms that look for flakes are the longest.
+    let scene = mixed_room(1);
+    let placement = Placement::new(&scene, 8, 8);
+    let settings = Settings {
+        geometry: GeometryChoice::List,
+        max_bounces: 128,
+        ..cached(&scene, 8, 8, 16)
+    };
+    assert_eq!(cache_obstacle(&scene, &placement, &settings), None);
+    let effects = Effects::derive(&scene, &placement, &settings);
+    let flaked = Effect::named("car_paint_coated_flakes").expect("a form");
+    let steps = vertex_steps(&placement, &effects.with(&[flaked], "the worst case"));
+    assert!(129 * u64::from(steps) <= LOOP_ITERATIONS, "{steps}");
 }

@@ -10,8 +10,12 @@ use crate::settings::{DEFAULT_MAX_BOUNCES, GeometryChoice, Integrator, Offset, S
 
 /// Most spheres of a scene with a cache: beyond, cells would be more than what they save.
 const MOST_SPHERES: usize = 64;
-/// Most bounces: a pilot's path then fits what drivers let an invocation do, whatever spheres there are.
+/// Most bounces and, of a mix, parts and bounces: a path of the pilot, whose loop does not look whether a driver has
+/// ended it, then makes fewer loop iterations than drivers stand (`shader::steps::paths_at_most`), whatever else a scene
+/// has. `tests/radiance_cache.rs` holds it to that.
 const MOST_BOUNCES: u32 = 128;
+const MOST_PARTS: usize = 4;
+const MOST_MIXED_BOUNCES: u32 = DEFAULT_MAX_BOUNCES;
 
 /// Why a render has no radiance cache; `None` where it can have one.
 #[must_use]
@@ -45,6 +49,14 @@ pub fn cache_obstacle(
         (
             settings.max_bounces > MOST_BOUNCES,
             "--max-bounces is above 128",
+        ),
+        (
+            placement.mixed[0] > MOST_PARTS,
+            "a mix of more than 4 materials",
+        ),
+        (
+            placement.mixed[0] > 0 && settings.max_bounces > MOST_MIXED_BOUNCES,
+            "--max-bounces is above 64, with a mix of materials",
         ),
         (settings.adaptive, "--adaptive"),
         (settings.classes, "layers by the kind of path"),

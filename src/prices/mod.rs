@@ -130,6 +130,8 @@ fn prepare_measured(scene: &Scene, settings: &Settings) -> Result<Job> {
         scene,
         &Settings {
             adaptive: false,
+            // Which goes without it.
+            radiance_cache: settings.radiance_cache && !settings.adaptive,
             error: None,
             time: None,
             ..settings.clone()

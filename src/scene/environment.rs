@@ -75,12 +75,6 @@ impl Sky {
         self.is_sound
     }
 
-    /// The largest radiance of any channel.
-    #[must_use]
-    pub fn brightest(&self) -> f64 {
-        self.brightest
-    }
-
     /// Refuses one that is too bright.
     pub(super) fn check_brightest(&self) -> Result<(), String> {
         if self.brightest <= MAX_MAGNITUDE {

@@ -236,12 +236,12 @@ pub fn step_limit(placement: &Placement, effects: &Effects, max_bounces: u32, gl
 }
 
 /// The paths of the radiance cache's pilot that an invocation takes in one dispatch: as many as fit however long they
-/// are, for its loop does not look. 0: there can be no such pilot.
+/// are, for its loop does not look. One does at least: where none might there is no radiance cache.
 #[must_use]
 pub fn paths_at_most(placement: &Placement, effects: &Effects, max_bounces: u32) -> u32 {
     let vertex = u64::from(vertex_steps(placement, effects));
     let path = (u64::from(max_bounces) + 1) * vertex;
-    (LOOP_ITERATIONS / path) as u32
+    (LOOP_ITERATIONS / path).max(1) as u32
 }
 
 /// Loops of a block, those within others among them.

@@ -1,4 +1,4 @@
-"""Makes the numbers of FLIP and SSIM in tests/compare.rs, from the authors' own FLIP and scikit-image.
+"""Makes the numbers of FLIP and SSIM in tests/compare/, from the authors' own FLIP and scikit-image.
 
     pip install flip-evaluator==1.7 scikit-image==0.26.0
     python perception.py

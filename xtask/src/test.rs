@@ -34,7 +34,7 @@ const LONG_FORMS: &str = "GPU_TRACE_TEST_ALL";
 ///
 /// The files of `tests/` that one driver answers for all: those that open no GPU; those of files, options,
 /// processes and studies, to which a GPU is one like another; those of light transport.
-const ONCE: [&str; 38] = [
+const ONCE: [&str; 39] = [
     "albedo_variance",
     "car_paint",
     "choice",
@@ -59,6 +59,7 @@ const ONCE: [&str; 38] = [
     "input",
     "job",
     "ledger",
+    "library",
     "material_keys",
     "measured",
     "mix",

@@ -1,4 +1,4 @@
-//! Twin of `shaders/scene/priority.wesl`: nested dielectrics after Schmidt and Budge (2002).
+//! Twin of `shaders/scene/media/nested.wesl`: nested dielectrics after Schmidt and Budge (2002).
 
 use crate::placement::Medium;
 
