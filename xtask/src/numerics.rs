@@ -53,7 +53,9 @@ pub(crate) fn all(arguments: &[String]) -> Result<(), String> {
     }
     drivers.retain(|driver| choice.has(driver.name));
     if drivers.is_empty() {
-        return Err(format!("no driver of this name is there\n{USAGE}"));
+        return Err(format!(
+            "no driver of this name is there; `cargo xtask test --drivers` installs those that are missing\n{USAGE}"
+        ));
     }
     let page = root().join(PAGE);
     let text = std::fs::read_to_string(&page).map_err(|e| format!("{PAGE}: {e}"))?;
