@@ -256,13 +256,16 @@ fn what_was_measured_before_a_stop_is_kept() {
 /// Which has no radiance cache: what is measured is what is rendered.
 #[test]
 fn what_is_asked_for_without_effect_is_not_measured() {
-    let list = measured_with("lecture", 2, |settings| {
-        (settings.adaptive, settings.radiance_cache) = (true, true);
-    });
-    let reasons = |effect: Effect| {
-        let price = list.prices.iter().find(|price| price.effect == effect);
-        &price.expect("a row").reasons
+    let has = |adaptive: bool| {
+        let list = measured_with("lecture", 2, |settings| {
+            (settings.adaptive, settings.radiance_cache) = (adaptive, true);
+        });
+        [Effect::Adaptive, Effect::RadianceCache].map(|effect| {
+            let price = list.prices.iter().find(|price| price.effect == effect);
+            !price.expect("a row").reasons.is_empty()
+        })
     };
-    assert!(!reasons(Effect::Adaptive).is_empty());
-    assert!(reasons(Effect::RadianceCache).is_empty());
+    assert_eq!(has(true), [true, false]);
+    // Companion: without what stands against it it is there.
+    assert_eq!(has(false), [false, true]);
 }

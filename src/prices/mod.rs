@@ -126,12 +126,13 @@ pub fn smaller(settings: &Settings) -> Settings {
 
 /// The job that is measured: its turns have the same samples everywhere, and end with them.
 fn prepare_measured(scene: &Scene, settings: &Settings) -> Result<Job> {
+    let asked = prepare(scene, settings)?;
     let job = prepare(
         scene,
         &Settings {
             adaptive: false,
-            // Which goes without it.
-            radiance_cache: settings.radiance_cache && !settings.adaptive,
+            // What is asked for decides whether there is one.
+            radiance_cache: asked.cells().is_some(),
             error: None,
             time: None,
             ..settings.clone()
