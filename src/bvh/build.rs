@@ -152,11 +152,11 @@ fn bounds_of(items: &[Item]) -> Bounds {
 fn extent(items: &[Item], options: Options) -> Extent {
     let bounds = bounds_of(items);
     let center = (0.5 * (bounds.low.as_dvec3() + bounds.high.as_dvec3())).as_vec3();
-    let reach = |item: &Item| {
+    let farthest = |item: &Item| {
         let aside = (item.center.as_dvec3() - center.as_dvec3()).abs();
         aside + item.way.as_dvec3() + f64::from(item.radius)
     };
-    let half = items.iter().map(reach).fold(DVec3::ZERO, DVec3::max) * options.scale;
+    let half = items.iter().map(farthest).fold(DVec3::ZERO, DVec3::max) * options.scale;
     let half = half + options.slack * half.max_element();
     Extent {
         center,

@@ -152,11 +152,11 @@ fn one_by_one(context: &Context, measure: &mut Measure) -> Result<()> {
 
 /// Ways of the spheres of a crowd: one that all have, and one of its own for each but every fourth.
 fn ways(crowd: &Crowd, random: &mut Random) -> Vec<DVec3> {
-    let reach = crowd
+    let farthest = crowd
         .balls
         .iter()
         .map(|(center, radius)| f64::from(center.length() + radius));
-    let extent = reach.fold(0.0, f64::max);
+    let extent = farthest.fold(0.0, f64::max);
     let common = extent * random.magnitude(-2.0, 0.0) * random.direction();
     let own = crowd.balls.iter().enumerate().map(|(i, (_, radius))| {
         let own = f64::from(*radius) * random.magnitude(-2.0, 0.5) * random.direction();

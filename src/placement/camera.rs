@@ -42,8 +42,8 @@ pub(super) fn approach(scene: &Scene, forward: DVec3) -> f64 {
             (forward.dot(s.center - eye), s.radius + way)
         })
         // What is wholly behind the lens is out of every ray's way.
-        .filter(|(depth, reach)| depth + reach > 0.0)
-        .map(|(depth, reach)| depth - reach)
+        .filter(|(depth, half)| depth + half > 0.0)
+        .map(|(depth, half)| depth - half)
         .fold(f64::INFINITY, f64::min);
     if nearest.is_finite() {
         nearest.max(0.0)

@@ -21,7 +21,7 @@ pub(super) fn length(
             ),
             None => (i, centers[i].length() + scene.spheres[i].radius),
         })
-        .map(|(i, reach)| reach + 0.5 * scene.spheres[i].motion.length())
+        .map(|(i, distance)| distance + 0.5 * scene.spheres[i].motion.length())
         .fold(0.0, f64::max);
     if extent > 0.0 {
         (-extent.log2().floor()).exp2()

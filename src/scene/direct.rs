@@ -14,6 +14,7 @@ use super::{Camera, Environment, Handedness, RenderDefaults, Scene, Sphere, cont
 use crate::error::{Error, Result};
 use crate::materials::Material;
 use crate::materials::diffuse::{self, Diffuse};
+use crate::materials::schema::MAX_MAGNITUDE;
 
 /// Size of the picture, in pixels.
 const SIZE: [u32; 2] = [960, 720];
@@ -38,7 +39,7 @@ const LAMP_SHARE: f64 = 0.5;
 pub fn load(path: &Path, look: &Look) -> Result<Loaded> {
     let request = request(path, look)?;
     let cloud = gather(&request).map_err(|fault| usage(&fault))?;
-    let view = View::of(&cloud.balls);
+    let view = View::of(&cloud.balls)?;
     Ok(loaded(path, look, cloud, &view))
 }
 
@@ -93,7 +94,7 @@ impl Movie {
         }
         let movie = Self {
             look: look.clone(),
-            view: framing.view(),
+            view: framing.view()?,
             request,
         };
         Ok((movie, frames))
@@ -263,7 +264,7 @@ struct View {
 }
 
 impl View {
-    fn of(balls: &[Ball]) -> Self {
+    fn of(balls: &[Ball]) -> Result<Self> {
         let mut framing = Framing::about(around(NOWHERE, balls));
         framing.add(balls);
         framing.view()
@@ -322,9 +323,21 @@ impl Framing {
         }
     }
 
-    fn view(&self) -> View {
+    /// The view from there.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if camera or lamp would be farther away than a scene may say.
+    fn view(&self) -> Result<View> {
         let distance = MARGIN * self.distance;
-        View {
+        let farthest = distance.max((LAMP[0] + LAMP[1]) * self.extent);
+        if self.center.abs().max_element() + farthest > MAX_MAGNITUDE {
+            return Err(Error::Usage(format!(
+                "the particles extend to {:e} from their middle: camera and lamp would be beyond {MAX_MAGNITUDE:e}; \
+                 in a scene file `transform` brings them together",
+                self.extent
+            )));
+        }
+        Ok(View {
             camera: Camera {
                 position: self.center - distance * self.forward,
                 look_at: self.center,
@@ -336,7 +349,7 @@ impl Framing {
             },
             center: self.center,
             extent: self.extent,
-        }
+        })
     }
 }
 
@@ -347,7 +360,7 @@ mod tests {
 
     /// The largest share of a half of the picture that a ball reaches to, in the directions up and across; 1
     /// is the edge.
-    fn reach(camera: &Camera, balls: &[Ball]) -> f64 {
+    fn filled(camera: &Camera, balls: &[Ball]) -> f64 {
         let [forward, right, up] = axes(camera.position, camera.look_at, camera.up);
         let half = (0.5 * FOV).to_radians();
         let aspect = f64::from(SIZE[0]) / f64::from(SIZE[1]);
@@ -383,16 +396,33 @@ mod tests {
                     }
                 };
                 let balls: Vec<Ball> = (0..50).map(|_| ball()).collect();
-                let View { camera, .. } = View::of(&balls);
-                let reach_of = |camera: &Camera| reach(camera, &balls);
-                let there = reach_of(&camera);
+                let View { camera, .. } = View::of(&balls).expect("a view");
+                let filled_by = |camera: &Camera| filled(camera, &balls);
+                let there = filled_by(&camera);
                 assert!((0.9..1.0).contains(&there), "{shape:?}: {there}");
                 // Companion: from a tenth nearer not all is.
                 let mut near = camera.clone();
                 near.position = near.position.lerp(near.look_at, 0.1);
-                assert!(reach_of(&near) > 1.0, "{shape:?}: {}", reach_of(&near));
+                assert!(filled_by(&near) > 1.0, "{shape:?}: {}", filled_by(&near));
             }
         }
+    }
+
+    #[test]
+    fn what_is_too_far_apart_for_a_camera_is_an_error() {
+        let ball = |x: f64| Ball {
+            center: x * DVec3::X,
+            radius: 1.0,
+            color: 0,
+        };
+        let of = |x: f64| View::of(&[ball(-x), ball(x)]);
+        let error = of(3e19).expect_err("too far").to_string();
+        assert!(
+            error.contains("extend to 3e19 from their middle"),
+            "{error}"
+        );
+        let view = of(1e19).expect("a view");
+        assert!(view.camera.position.is_finite());
     }
 
     #[test]
@@ -407,7 +437,7 @@ mod tests {
             colors: Vec::new(),
             range: None,
         };
-        let view = View::of(&cloud.balls);
+        let view = View::of(&cloud.balls).expect("a view");
         let scene = scene(cloud, &view, BACKGROUND);
         let lamp = scene.spheres.last().expect("a lamp");
         let lamp = Ball {

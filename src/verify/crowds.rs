@@ -182,8 +182,8 @@ impl Crowd {
                     ),
                     // From some distance, in scales of either.
                     2 | 3 => {
-                        let reach = if i % 2 == 0 { size } else { f64::from(radius) };
-                        let eye = aim + reach * random.magnitude(0.1, 3.0) * random.direction();
+                        let scale = if i % 2 == 0 { size } else { f64::from(radius) };
+                        let eye = aim + scale * random.magnitude(0.1, 3.0) * random.direction();
                         let d = aim - eye;
                         let across = d.cross(random.direction()).normalize_or_zero();
                         rows(

@@ -1,23 +1,20 @@
 //! The structs that host and kernel share have the same layout on both sides.
 
-use std::collections::BTreeSet;
+mod glsl;
+mod material;
+
 use std::mem::offset_of;
 
 use crate::common::scene;
-use glam::DVec3;
-use gpu_trace::effects::{Effect, Effects, completed};
+use gpu_trace::effects::Effects;
 use gpu_trace::gpu::probe::ShapeRecord;
-use gpu_trace::materials::Material;
-use gpu_trace::materials::dielectric::Index;
-use gpu_trace::materials::{ALL, Form, Member, MemberKind, MemberValue, forms};
 use gpu_trace::placement::Placement;
 use gpu_trace::records::layout::{
     CameraRecord, ChartRecord, CountersRecord, DispatchRecord, LightRecord, PilotRecord,
     PoleRecord, SphereRecord,
 };
-use gpu_trace::records::material::MaterialRecord;
 use gpu_trace::settings::Settings;
-use gpu_trace::shader::{Folder, Kernel, Stage, link, material_members};
+use gpu_trace::shader::{Folder, Kernel, Stage, link};
 use gpu_trace::verify::EMPTY;
 
 /// Name and offset of every member, and the size.
@@ -81,119 +78,6 @@ fn check(name: &str, host: &Layout, kernel: &Kernel) {
 const FULL: [&str; 10] = [
     "list", "pole", "interior", "lens", "motion", "diffuse", "emission", "lights", "table", "mis",
 ];
-
-/// Structs that GLSL would lay out otherwise, and why. naga writes their members without offsets
-/// (gfx-rs/wgpu issue 4374), so that std430 places them by type alone, which is also what WGSL does
-/// where no `@align` or `@size` says otherwise; std140, of uniforms, is the same for scalars and
-/// vectors.
-fn other_in_glsl(module: &naga::Module) -> Vec<String> {
-    let mut layouter = naga::proc::Layouter::default();
-    layouter.update(module.to_ctx()).expect("a valid module");
-    let mut faults = Vec::new();
-    for (_, ty) in module.types.iter() {
-        let naga::TypeInner::Struct { members, span } = &ty.inner else {
-            continue;
-        };
-        let (mut end, mut align) = (0, naga::proc::Alignment::ONE);
-        for member in members {
-            let layout = layouter[member.ty];
-            let offset = layout.alignment.round_up(end);
-            if offset != member.offset {
-                faults.push(format!("{member:?} of {:?} is at {offset}", ty.name));
-            }
-            end = offset + layout.size;
-            align = align.max(layout.alignment);
-        }
-        if align.round_up(end) != *span {
-            faults.push(format!("{:?} has another size than {span}", ty.name));
-        }
-    }
-    for (_, variable) in module.global_variables.iter() {
-        if variable.space != naga::AddressSpace::Uniform {
-            continue;
-        }
-        let simple = |ty: naga::Handle<naga::Type>| {
-            matches!(
-                module.types[ty].inner,
-                naga::TypeInner::Scalar(_) | naga::TypeInner::Vector { .. }
-            )
-        };
-        let fits = match &module.types[variable.ty].inner {
-            naga::TypeInner::Struct { members, .. } => members.iter().all(|m| simple(m.ty)),
-            _ => simple(variable.ty),
-        };
-        if !fits {
-            faults.push(format!(
-                "{:?} holds more than scalars and vectors",
-                variable.name
-            ));
-        }
-    }
-    faults
-}
-
-#[test]
-fn glsl_has_the_same_layouts() {
-    let optional = [
-        "pole",
-        "interior",
-        "lens",
-        "motion",
-        "emission",
-        "reflective",
-        "dielectric",
-        "priority",
-        "sobol",
-    ];
-    let named = |name: &str| Effect::named(name).expect("an effect");
-    let chosen = |set: u32| (0..optional.len()).filter(move |i| set >> i & 1 == 1);
-    // Many sets are the same once they have what their effects need.
-    let sets: BTreeSet<_> = (0..1 << optional.len())
-        .filter_map(|set| {
-            let names = chosen(set).map(|i| optional[i]);
-            completed(names.chain(["list", "diffuse"]).map(named))
-        })
-        .collect();
-    assert!(sets.len() > 100, "{}", sets.len());
-    for set in sets {
-        let names: Vec<&str> = set.iter().map(|effect| effect.name()).collect();
-        for stage in Folder::ALL
-            .map(Stage::Probe)
-            .into_iter()
-            .chain([Stage::Path])
-        {
-            let faults = other_in_glsl(&kernel(stage, &names).module);
-            assert_eq!(faults, [""; 0], "{stage:?} of {names:?}");
-        }
-    }
-    // With lights in the scene's data, and with a tree.
-    let tree = FULL.map(|name| if name == "list" { "bvh" } else { name });
-    for names in [FULL, tree] {
-        assert_eq!(other_in_glsl(&kernel(Stage::Path, &names).module), [""; 0]);
-    }
-}
-
-#[test]
-fn companion_what_glsl_would_move_is_found() {
-    for (members, space) in [
-        ("a: vec3f, @align(16) b: f32", "storage, read"),
-        ("@size(8) a: f32, b: f32", "storage, read"),
-        ("@align(16) a: f32", "storage, read"),
-        ("a: array<vec4f, 2>", "uniform"),
-        (
-            "a: array<f32, 3>, @align(16) b: array<u32, 2>",
-            "storage, read",
-        ),
-    ] {
-        let faults = |members: &str| {
-            let wgsl =
-                format!("struct S {{ {members} }}\n@group(0) @binding(0) var<{space}> s: S;");
-            other_in_glsl(&naga::front::wgsl::parse_str(&wgsl).expect("valid WGSL"))
-        };
-        assert_ne!(faults(members), [""; 0], "{members}");
-        assert_eq!(faults("a: vec3f, b: f32, c: vec2f"), [""; 0]);
-    }
-}
 
 fn camera() -> Layout {
     host!(CameraRecord {
@@ -422,131 +306,6 @@ fn companion_a_wrong_layout_is_found() {
     more.0.push(("extra".into(), good.1));
     assert!(mismatch(&more, &device, false).is_some());
     assert!(mismatch(&(good.0, good.1 + 16), &device, false).is_some());
-}
-
-/// Offsets and size of a struct of these members by WGSL's rules.
-fn by_the_rules(members: &[Member]) -> Layout {
-    let mut end: u32 = 0;
-    let mut layout = Vec::new();
-    for member in members {
-        let (align, size) = match member.kind {
-            MemberKind::Vector => (16, 12),
-            MemberKind::Scalar | MemberKind::Word => (4, 4),
-        };
-        let offset = end.next_multiple_of(align);
-        layout.push((member.name.to_owned(), offset));
-        end = offset + size;
-    }
-    (layout, end.next_multiple_of(16))
-}
-
-/// Sets of forms of materials: each alone, each two, and all.
-fn sets_of_forms() -> Vec<Vec<u32>> {
-    let codes = 0..forms().len() as u32;
-    let mut sets: Vec<Vec<u32>> = codes.clone().map(|code| vec![code]).collect();
-    let pairs = codes.clone().flat_map(|a| (0..a).map(move |b| vec![b, a]));
-    sets.extend(pairs);
-    sets.push(codes.collect());
-    sets
-}
-
-/// The bytes of a value.
-fn bytes_of(value: &MemberValue) -> Vec<u8> {
-    match value {
-        MemberValue::Vector(v) => bytemuck::cast_slice(&v[..]).to_vec(),
-        MemberValue::Scalar(x) => x.to_ne_bytes().to_vec(),
-        MemberValue::Word(x) => x.to_ne_bytes().to_vec(),
-    }
-}
-
-/// What is wrong with the record of `material` in the kernel of `members`, if anything is.
-fn wrong_record(material: &Material, members: &[Member], code: u32) -> Option<String> {
-    let (offsets, size) = by_the_rules(members);
-    let pairs: Vec<(Member, u32)> = std::iter::zip(members, &offsets)
-        .map(|(member, (_, offset))| (*member, *offset))
-        .collect();
-    let bytes = MaterialRecord::new(material, 2.0, 4.0).bytes(&pairs, size);
-    let form = material.kind.form();
-    let mut values: Vec<(&str, MemberValue)> = vec![
-        ("color", material.kind.color().into()),
-        ("kind", MemberValue::Word(code)),
-        ("emission", (2.0 * material.emission).into()),
-        ("absorption", (0.25 * material.kind.absorption()).into()),
-    ];
-    match material.kind.dispersion() {
-        Some(Index::Cauchy(terms)) => values.push(("cauchy", terms.y.into())),
-        Some(Index::Sellmeier(terms)) => {
-            values.push(("sellmeier_b", terms.b.into()));
-            values.push(("sellmeier_c", terms.c.into()));
-        }
-        _ => {}
-    }
-    let own = form.members.iter().map(|member| member.name);
-    values.extend(own.zip(material.kind.members()));
-    pairs.iter().find_map(|(member, offset)| {
-        // What other materials have is 0, or 1 for an index.
-        let neutral = match member.kind {
-            MemberKind::Vector => MemberValue::Vector([0.0; 3]),
-            MemberKind::Scalar => MemberValue::Scalar(if member.name == "ior" { 1.0 } else { 0.0 }),
-            MemberKind::Word => MemberValue::Word(0),
-        };
-        let own = values.iter().find(|(name, _)| *name == member.name);
-        let expected = bytes_of(own.map_or(&neutral, |(_, value)| value));
-        let found = &bytes[*offset as usize..][..expected.len()];
-        (found != expected).then(|| format!("{}: {found:?} for {expected:?}", member.name))
-    })
-}
-
-#[test]
-fn material_agrees_for_all_forms() {
-    for codes in sets_of_forms() {
-        for emission in [false, true] {
-            let chosen: Vec<&Form> = codes.iter().map(|code| forms()[*code as usize]).collect();
-            let mut names = vec!["list"];
-            names.extend(chosen.iter().map(|form| form.name));
-            names.extend(emission.then_some("emission"));
-            let transmits = chosen.iter().any(|form| form.transmits);
-            names.extend(transmits.then_some("interior"));
-            let absorbs = emission && transmits;
-            names.extend(absorbs.then_some("absorption"));
-            names.extend(absorbs.then_some("dispersion"));
-            let members = material_members(&Effects::named(&names));
-            // Those of the forms, each once, and what all have.
-            let mut wanted: Vec<Member> = vec![Member::vector("color"), Member::word("kind")];
-            wanted.extend(emission.then_some(Member::vector("emission")));
-            wanted.extend(absorbs.then_some(Member::vector("absorption")));
-            if absorbs {
-                wanted.extend(["sellmeier_b", "sellmeier_c"].map(Member::vector));
-                wanted.push(Member::scalar("cauchy"));
-            }
-            for member in chosen.iter().flat_map(|form| form.members) {
-                if !wanted.contains(member) {
-                    wanted.push(*member);
-                }
-            }
-            assert_eq!(members.len(), wanted.len(), "{names:?}: {members:?}");
-            assert!(wanted.iter().all(|m| members.contains(m)), "{members:?}");
-            let kernel = kernel(Stage::Path, &names);
-            assert_eq!(
-                device(&kernel, "Material"),
-                by_the_rules(&members),
-                "{names:?}"
-            );
-
-            // Every value lies where the rules say.
-            for kind in ALL.iter().flat_map(|material| (material.cases)()) {
-                let code = forms().iter().position(|form| *form == kind.form());
-                let code = code.expect("a form of the list") as u32;
-                let material = Material {
-                    emission: DVec3::new(7.0, 7.125, 7.25),
-                    ..Material::new("m", kind)
-                };
-                assert_eq!(wrong_record(&material, &members, code), None, "{names:?}");
-                // Companion: another code.
-                assert!(wrong_record(&material, &members, code + 1).is_some());
-            }
-        }
-    }
 }
 
 #[test]
