@@ -56,6 +56,9 @@ fn main() {
     if chosen("trees") {
         trees::run();
     }
+    if wanted.iter().any(|w| w == "scale") {
+        trees::scale();
+    }
     if chosen("roofline") {
         roofline::run();
     }

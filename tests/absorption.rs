@@ -29,7 +29,12 @@ fn transmittance_is_beers() {
                 1 => random.magnitude(-37.0, 38.0),
                 _ => random.magnitude(-3.0, 1.5) / t,
             };
-            let absorption = [(); 3].map(|()| absorption().min(1.0e38) as f32);
+            // What the host writes: 0, or a normal number. Of others a device may make 0.
+            let rounded = |x: f64| match x {
+                0.0 => 0.0,
+                x => (x.min(1.0e38) as f32).max(f32::MIN_POSITIVE),
+            };
+            let absorption = [(); 3].map(|()| rounded(absorption()));
             [absorption[0], absorption[1], absorption[2], t as f32]
         })
         .collect();

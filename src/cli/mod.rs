@@ -6,6 +6,8 @@ mod choices;
 mod compare;
 mod converge;
 mod devices;
+#[cfg(test)]
+mod documented;
 mod effects;
 mod fault;
 mod format;
@@ -30,16 +32,16 @@ pub use args::RenderArgs;
 
 const AFTER_HELP: &str = "\
 Examples:
-  gpu-trace                                    the built-in lecture scene, to lecture.png
-  gpu-trace glass --spp 1024 -o glass.exr      another scene, linear floats
-  gpu-trace my.toml --error 1% --time 2m       until the error is 1 % or two minutes are over
-  gpu-trace resume my.film                     go on with what --checkpoint my.film kept
-  gpu-trace submit slurm my.toml --tasks 8     render on eight machines of a cluster
-  gpu-trace price my.toml                      what will 1 % cost, in seconds?
-  gpu-trace effects my.toml                    what the kernel will hold, and why
-  gpu-trace check --quick                      does this adapter stand the hard cases?
-  gpu-trace compare a.exr b.exr --tolerance 1% is image a within 1 % of reference b?
-  gpu-trace converge --study cpu-gpu           error against time, as a report with plots
+  gpu-trace                                     the built-in lecture scene, to lecture.png
+  gpu-trace glass --spp 1024 -o glass.exr       another scene, linear floats
+  gpu-trace my.toml --error 1% --time 2m        until the error is 1 % or two minutes are over
+  gpu-trace resume my.film                      go on with what --checkpoint my.film kept
+  gpu-trace submit slurm my.toml --tasks 8      render on eight machines of a cluster
+  gpu-trace price my.toml                       what will 1 % cost, in seconds?
+  gpu-trace effects my.toml                     what the kernel will hold, and why
+  gpu-trace check --quick                       does this adapter stand the hard cases?
+  gpu-trace compare a.exr b.exr --tolerance 1%  is image a within 1 % of reference b?
+  gpu-trace converge --study cpu-gpu            error against time, as a report with plots
 
 Exit codes: 0 done; 1 failed; 2 wrong usage or a bad scene; 3 a check failed; 129, 130 or 143 ended
 by a signal, with what there was written.";

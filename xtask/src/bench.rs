@@ -13,7 +13,9 @@ Usage: cargo xtask bench [TABLE...] [--quick]
   offsets    ways to leave a surface: what each gets wrong, and costs
   geometry   spheres as constants or in a buffer
   materials  seven balls of each material against diffuse ones
-  trees      a loop over all spheres against a tree, for 32 to 1e6 of them
+  trees      a loop over all spheres against a tree, for 32 to 1024 of them
+  scale      what a tree costs for 1e2 to 1e7 spheres (writes docs/images/scale.svg; takes minutes, and
+             some 6 GB)
   roofline   the peak of the ray-sphere test on the device, and what share of it scenes reach
   loading    from a scene file to the first dispatch: each stage for 1e3, 1e4 and 1e5 spheres
   forecasts  what price says of five scenes, and what the renders then take (some minutes)
@@ -26,12 +28,12 @@ Usage: cargo xtask bench [TABLE...] [--quick]
   coverage   how often 95 % intervals hold the truth, over 200 seeds (half an hour)
   trust      how often verdicts on errors are right, over 200 seeds (a quarter of an hour)
 
-Without a name: all but forecasts, peers, hazards, coverage and trust. Run it on an idle machine.
+Without a name: all but scale, forecasts, peers, hazards, coverage and trust. Run it on an idle machine.
 ";
 
 /// Runs the benchmarks named in `tables`.
 pub(crate) fn all(tables: &[String]) -> Result<(), String> {
-    const KNOWN: [&str; 14] = [
+    const KNOWN: [&str; 15] = [
         "naive",
         "unused",
         "geometry",
@@ -46,6 +48,7 @@ pub(crate) fn all(tables: &[String]) -> Result<(), String> {
         "hazards",
         "coverage",
         "trust",
+        "scale",
     ];
     if tables.iter().any(|t| t == "--help" || t == "-h") {
         print!("{USAGE}");
@@ -88,6 +91,9 @@ pub(crate) fn all(tables: &[String]) -> Result<(), String> {
     }
     if tables.iter().any(|t| t == "hazards") {
         hazards()?;
+    }
+    if tables.iter().any(|t| t == "scale") {
+        scale()?;
     }
     if tables.iter().any(|t| t == "coverage") {
         run(cargo()
@@ -147,30 +153,41 @@ fn peak_memory(command: &mut Command) -> Option<u64> {
     peak
 }
 
-/// The Python of an environment with Mitsuba, installed if it is not there.
-fn python() -> Result<PathBuf, String> {
-    let environment = Path::new("target/peers");
-    let python = environment.join("bin/python");
+/// The table of what a tree costs, and its picture.
+fn scale() -> Result<(), String> {
+    let csv = std::path::absolute("target/scale.csv").map_err(|e| e.to_string())?;
+    run(cargo()
+        .args(["bench", "--bench", "speed", "--", "scale"])
+        .env("GPU_TRACE_SCALE", &csv)
+        .env("NODEVICE_SELECT", "1"))?;
+    run(Command::new(python("target/plots", &["matplotlib"])?)
+        .arg("benches/trees/plot.py")
+        .arg(&csv)
+        .arg("docs/images/scale.svg"))
+}
+
+/// What stands beside us: see [`python`].
+fn mitsuba() -> Result<PathBuf, String> {
+    python("target/peers", &["mitsuba==3.9.1", "numpy", "pillow"])
+}
+
+/// The Python of an environment with these packages, installed if they are not there.
+fn python(environment: &str, packages: &[&str]) -> Result<PathBuf, String> {
+    let python = Path::new(environment).join("bin/python");
     if !python.exists() {
         run(Command::new("python3")
             .args(["-m", "venv"])
             .arg(environment))?;
     }
-    run(Command::new(&python).args([
-        "-m",
-        "pip",
-        "install",
-        "--quiet",
-        "mitsuba==3.9.1",
-        "numpy",
-        "pillow",
-    ]))?;
+    run(Command::new(&python)
+        .args(["-m", "pip", "install", "--quiet"])
+        .args(packages))?;
     Ok(python)
 }
 
 /// Takes turns with Mitsuba.
 fn peers(quick: bool) -> Result<(), String> {
-    run(Command::new(python()?)
+    run(Command::new(mitsuba()?)
         .arg("benches/peers/side_by_side.py")
         .arg(program("release"))
         .args(quick.then_some("--quick"))
@@ -179,7 +196,7 @@ fn peers(quick: bool) -> Result<(), String> {
 
 /// Renders the hazard scenes with everything and compares.
 fn hazards() -> Result<(), String> {
-    let python = python()?;
+    let python = mitsuba()?;
     // Absolute: cargo runs a benchmark in its package's folder.
     let folder = std::path::absolute("target/hazards").map_err(|e| e.to_string())?;
     run(cargo()

@@ -13,7 +13,7 @@ Usage: cargo xtask numerics [--driver NAME]... [--case NUMBER[,NUMBER]...]...
 
 Runs `gpu-trace check` and puts what it says into the table of docs/numerics.md.
 
-  --driver   on this driver only, by a part of its name: lavapipe, SwiftShader, GL
+  --driver   on this driver only, by a part of its name: lavapipe, SwiftShader, GL, current Mesa
   --case     these cases only
 
 What is not measured this time keeps its place in the table.
@@ -110,7 +110,8 @@ fn report(driver: &Driver, cases: &[String]) -> Result<Value, String> {
     let shown: Vec<_> = command.get_args().map(|a| a.to_string_lossy()).collect();
     eprintln!("{}: gpu-trace {}", driver.name, shown.join(" "));
     let output = driver
-        .choose(command.stderr(Stdio::inherit()))
+        .choose(&command)
+        .stderr(Stdio::inherit())
         .output()
         .map_err(|e| e.to_string())?;
     serde_json::from_slice(&output.stdout).map_err(|e| format!("{}: {e}", driver.name))

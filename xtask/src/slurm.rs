@@ -64,7 +64,7 @@ pub(crate) fn all(arguments: &[String]) -> Result<(), String> {
             TESTS,
         ])
         .env("SLURM_CONF", slurm.configuration());
-    run(driver.choose(&mut tests))
+    run(&mut driver.choose(&tests))
 }
 
 /// Where a command is: daemons are not in everybody's `PATH`.

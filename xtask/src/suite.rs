@@ -214,8 +214,8 @@ fn one(driver: &Driver, job: Job, variable: Option<(&str, &str)>) -> Count {
     let name = format!("{name} on {}", driver.name);
     eprintln!("started {name}");
     let before = Instant::now();
-    command.envs(variable).stdin(Stdio::null());
-    let output = driver.choose(&mut command).output();
+    let mut command = driver.choose(command.envs(variable));
+    let output = command.stdin(Stdio::null()).output();
     let seconds = before.elapsed().as_secs_f64();
     let mut count = Count {
         seconds,

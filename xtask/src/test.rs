@@ -11,8 +11,8 @@ const USAGE: &str = "\
 Usage: cargo xtask test [--all] [--drivers] [ARGUMENTS OF CARGO TEST...] [-- PARTS OF NAMES... OPTIONS...]
 
 Format, lints, documentation; all tests on Mesa lavapipe, which is installed if need be; then those
-that another driver may answer differently on SwiftShader and on llvmpipe through GL, where these are
-there. Where the environment names a driver (VK_ICD_FILENAMES, VK_DRIVER_FILES, WGPU_BACKEND), on that
+that another driver may answer differently on SwiftShader, on llvmpipe through GL and on a current Mesa,
+where these are there. Where the environment names a driver (VK_ICD_FILENAMES, VK_DRIVER_FILES, WGPU_BACKEND), on that
 alone.
 
   --all       the long forms of the tests, and all of them on every driver

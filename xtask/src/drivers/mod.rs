@@ -1,11 +1,14 @@
 //! The drivers in software that the tests run on: finding, installing and choosing them.
 
+mod current_mesa;
+mod swiftshader;
+
 use std::ffi::OsString;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Stdio};
 
-use crate::{program, root, run};
+use crate::{program, run};
 
 /// Where distributions keep lavapipe's manifest.
 const LAVAPIPE: &[&str] = &[
@@ -23,20 +26,14 @@ the tests need Mesa lavapipe, a Vulkan driver without a GPU. Install it and try 
 /// Variables that choose a driver: where the user has set one, the tests run on that driver alone.
 const CHOICES: [&str; 3] = ["VK_ICD_FILENAMES", "VK_DRIVER_FILES", "WGPU_BACKEND"];
 
-/// Debian's package with SwiftShader, and what of it is wanted. The manifest names the library as
-/// its neighbour.
-const SWIFTSHADER_PACKAGE: &str = "chromium-common";
-const SWIFTSHADER_MANIFEST: &str = "vk_swiftshader_icd.json";
-const SWIFTSHADER_LIBRARY: &str = "libvk_swiftshader.so";
-/// Our note of the package that it came from.
-const SWIFTSHADER_VERSION: &str = "package";
-
-/// A driver, and the variables that choose it.
+/// A driver, and what chooses it.
 #[derive(Clone, Debug)]
 pub(crate) struct Driver {
     /// What we call it.
     pub(crate) name: &'static str,
     variables: Vec<(&'static str, OsString)>,
+    /// What a program is started by, if not by itself: a loader that has the driver's own libraries.
+    loader: Vec<OsString>,
 }
 
 impl Driver {
@@ -45,15 +42,30 @@ impl Driver {
         Self {
             name: "system",
             variables: Vec::new(),
+            loader: Vec::new(),
         }
     }
 
-    /// Makes `command` run on this driver.
-    pub(crate) fn choose<'a>(&self, command: &'a mut Command) -> &'a mut Command {
-        command
-            // Without a display, Mesa's device selection would complain on stderr.
-            .env("NODEVICE_SELECT", "1")
-            .envs(self.variables.iter().map(|(name, value)| (name, value)))
+    /// `command`, on this driver; what it reads and writes is not taken over.
+    pub(crate) fn choose(&self, command: &Command) -> Command {
+        let own = [command.get_program()];
+        let words = self.loader.iter().map(OsString::as_os_str).chain(own);
+        let mut words = words.chain(command.get_args());
+        let mut chosen = Command::new(words.next().unwrap_or_default());
+        chosen.args(words);
+        for (name, value) in command.get_envs() {
+            match value {
+                Some(value) => chosen.env(name, value),
+                None => chosen.env_remove(name),
+            };
+        }
+        if let Some(folder) = command.get_current_dir() {
+            chosen.current_dir(folder);
+        }
+        // Without a display, Mesa's device selection would complain on stderr.
+        chosen.env("NODEVICE_SELECT", "1");
+        chosen.envs(self.variables.iter().map(|(name, value)| (name, value)));
+        chosen
     }
 
     /// What the program says it runs on with this driver: adapter, and driver with its version;
@@ -79,7 +91,11 @@ impl Driver {
 /// The driver that all tests run on: lavapipe, which is installed if need be; or the one that the
 /// environment names, and then `true`: it is the only one.
 pub(crate) fn first() -> Result<(Driver, bool), String> {
-    let driver = |name, variables| Driver { name, variables };
+    let driver = |name, variables| Driver {
+        name,
+        variables,
+        loader: Vec::new(),
+    };
     if let Some(named) = CHOICES.iter().find(|name| std::env::var_os(name).is_some()) {
         eprintln!("{named} is set: using the driver that it names, and no other");
         return Ok((driver("environment", Vec::new()), true));
@@ -105,59 +121,79 @@ pub(crate) enum Optional {
     SwiftShader,
     /// Mesa's llvmpipe: GLSL in the place of SPIR-V.
     Gl,
+    /// Lavapipe some years younger than that of the distribution.
+    CurrentMesa,
 }
 
 impl Optional {
-    pub(crate) const ALL: [Self; 2] = [Self::SwiftShader, Self::Gl];
+    pub(crate) const ALL: [Self; 3] = [Self::SwiftShader, Self::Gl, Self::CurrentMesa];
 
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::SwiftShader => "SwiftShader",
             Self::Gl => "llvmpipe, GL",
+            Self::CurrentMesa => "current Mesa",
         }
     }
 
     /// The driver and what the program says of it, if it is there.
     pub(crate) fn find(self) -> Option<(Driver, String)> {
-        let variables = match self {
-            Self::SwiftShader => {
-                let manifest = folder().join(SWIFTSHADER_MANIFEST);
-                vec![(
-                    "VK_ICD_FILENAMES",
-                    manifest.exists().then_some(manifest)?.into(),
-                )]
+        let (variables, loader) = match self {
+            Self::SwiftShader => (vec![("VK_ICD_FILENAMES", swiftshader::find()?)], vec![]),
+            Self::Gl => {
+                let software = ("LIBGL_ALWAYS_SOFTWARE", "1".into());
+                (vec![("WGPU_BACKEND", "gl".into()), software], vec![])
             }
-            Self::Gl => vec![
-                ("WGPU_BACKEND", "gl".into()),
-                ("LIBGL_ALWAYS_SOFTWARE", "1".into()),
-            ],
+            Self::CurrentMesa => {
+                let (manifest, loader) = current_mesa::find()?;
+                (vec![("VK_ICD_FILENAMES", manifest)], loader)
+            }
         };
-        let name = self.name();
-        let driver = Driver { name, variables };
+        let driver = Driver {
+            name: self.name(),
+            variables,
+            loader,
+        };
         let mut adapter = driver.adapter()?;
         if let Self::SwiftShader = self {
             // It tells no version of its own.
-            let version = fs::read_to_string(folder().join(SWIFTSHADER_VERSION));
-            adapter = format!("{adapter} of {}", version.unwrap_or_default());
+            adapter = format!("{adapter} of {}", swiftshader::version());
         }
         Some((driver, adapter))
     }
 
-    /// Installs it: GL with apt, SwiftShader into `target/`.
+    /// Installs it: GL with apt, the others into `target/`.
     pub(crate) fn install(self) -> Result<(), String> {
         eprintln!("{} is not installed; trying apt-get", self.name());
         match self {
-            Self::SwiftShader => unpack_swiftshader().map_err(|error| {
-                format!("{error} (it is taken from Debian's package {SWIFTSHADER_PACKAGE})")
-            }),
+            Self::SwiftShader => swiftshader::unpack(),
             Self::Gl => install(&["libegl1", "libgl1-mesa-dri"]),
+            Self::CurrentMesa => current_mesa::unpack(),
         }
     }
 }
 
-/// Where SwiftShader is unpacked.
-fn folder() -> PathBuf {
-    root().join("target/drivers/swiftshader")
+/// An empty folder of this name.
+fn empty(folder: &Path) -> Result<(), String> {
+    let failed = |error: std::io::Error| format!("{}: {error}", folder.display());
+    if folder.exists() {
+        fs::remove_dir_all(folder).map_err(failed)?;
+    }
+    fs::create_dir_all(folder).map_err(failed)
+}
+
+/// Unpacks a package of Debian's into a folder, without installing it.
+fn unpack(package: &Path, folder: &Path) -> Result<(), String> {
+    run(Command::new("dpkg").arg("-x").arg(package).arg(folder))
+}
+
+/// The packages in a folder.
+fn packages(folder: &Path) -> Result<Vec<std::path::PathBuf>, String> {
+    let entries = fs::read_dir(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
+    let paths = entries.filter_map(|entry| Some(entry.ok()?.path()));
+    Ok(paths
+        .filter(|path| path.extension().is_some_and(|e| e == "deb"))
+        .collect())
 }
 
 fn apt() -> Command {
@@ -174,42 +210,4 @@ fn install(packages: &[&str]) -> Result<(), String> {
     run(apt()
         .args(["install", "-y", "--no-install-recommends"])
         .args(packages))
-}
-
-/// Takes SwiftShader out of the package that Debian has it in, without installing that.
-fn unpack_swiftshader() -> Result<(), String> {
-    let folder = folder();
-    let failed = |error: std::io::Error| format!("{}: {error}", folder.display());
-    let scratch = folder.with_extension("scratch");
-    if scratch.exists() {
-        fs::remove_dir_all(&scratch).map_err(failed)?;
-    }
-    fs::create_dir_all(&scratch).map_err(failed)?;
-    let download = || {
-        run(apt()
-            .args(["download", SWIFTSHADER_PACKAGE])
-            .current_dir(&scratch))
-    };
-    // The package lists may be missing, or older than what the mirror has.
-    download().or_else(|_| run(apt().arg("update")).and_then(|()| download()))?;
-    let package = fs::read_dir(&scratch)
-        .map_err(failed)?
-        .find_map(|entry| {
-            let path = entry.ok()?.path();
-            (path.extension()? == "deb").then_some(path)
-        })
-        .ok_or("apt-get download left no package")?;
-    run(Command::new("dpkg").arg("-x").arg(&package).arg(&scratch))?;
-    let version = package.file_name().unwrap_or_default().to_string_lossy();
-    fs::create_dir_all(&folder).map_err(failed)?;
-    fs::write(folder.join(SWIFTSHADER_VERSION), version.as_bytes()).map_err(failed)?;
-    // The manifest last: it says that all is there.
-    for file in [SWIFTSHADER_LIBRARY, SWIFTSHADER_MANIFEST] {
-        fs::rename(
-            scratch.join("usr/lib/chromium").join(file),
-            folder.join(file),
-        )
-        .map_err(|error| format!("{file} of {SWIFTSHADER_PACKAGE}: {error}"))?;
-    }
-    fs::remove_dir_all(&scratch).map_err(failed)
 }
