@@ -13,7 +13,7 @@ pub(super) fn imports(form: &Form, lecture: bool, deltas: bool) -> String {
         .to_vec();
     all.push("NO_PART".into());
     if !lecture || deltas {
-        all.extend(["choose_part", "part_material"].map(str::to_owned));
+        all.extend(["choose_part", "part_surface"].map(str::to_owned));
     }
     if lecture && deltas {
         all.push(format!("share_{name}"));
@@ -45,7 +45,7 @@ pub(super) fn functions(
         true => "",
         false => {
             "let chosen = choose_part(surface, wo, u.z);\nown = chosen.place;\nv.z = chosen.z;\n\
-             part.material = part_material(surface, own);\n"
+             part = part_surface(surface, own);\n"
         }
     };
     let mut text = format!(
