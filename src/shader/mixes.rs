@@ -13,7 +13,7 @@ pub(super) fn imports(form: &Form, lecture: bool, deltas: bool) -> String {
         .to_vec();
     all.push("NO_PART".into());
     if !lecture || deltas {
-        all.extend(["choose_part", "part_surface"].map(str::to_owned));
+        all.extend(["choose_part", "part_material"].map(str::to_owned));
     }
     if lecture && deltas {
         all.push(format!("share_{name}"));
@@ -32,6 +32,10 @@ pub(super) fn functions(
     deltas: bool,
 ) -> String {
     let name = form.name;
+    let found = match forms.iter().any(|(_, form)| form.offset) {
+        true => "part.found = find(part);\n",
+        false => "",
+    };
     // Uniform directions but for delta lobes.
     let uniform = match (lecture, deltas) {
         (false, _) => String::new(),
@@ -45,13 +49,13 @@ pub(super) fn functions(
         true => "",
         false => {
             "let chosen = choose_part(surface, wo, u.z);\nown = chosen.place;\nv.z = chosen.z;\n\
-             part = part_surface(surface, own);\n"
+             part.material = part_material(surface, own);\n"
         }
     };
     let mut text = format!(
         "fn sample(surface: Surface, wo: vec3f, u: vec4f) -> BsdfSample {{\n\
          var part = surface;\nvar v = u;\nvar own = NO_PART;\n\
-         if is_mix(surface.material) {{\n{uniform}{chosen}}}\n\
+         if is_mix(surface.material) {{\n{uniform}{chosen}}}\n{found}\
          let s = sample_part(part, wo, v);\n\
          if own == NO_PART {{ return s; }}\n\
          return sample_{name}(surface, wo, s, own);\n}}\n\
