@@ -118,6 +118,14 @@ impl Job {
         self
     }
 
+    /// The same with [separable shadowing](Effects::with_separable_shadowing) in the kernel.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn with_separable_shadowing(mut self) -> Self {
+        self.effects = self.effects.with_separable_shadowing();
+        self
+    }
+
     /// The same with effects in the kernel that nothing asks for, to measure what they cost; `why` is the reason
     /// given for them.
     ///

@@ -7,11 +7,14 @@
 
 use std::path::Path;
 
-use crate::common::images::fault;
+use crate::cli_support::Folder;
+use crate::common::images::{assert_alike, fault};
 use crate::common::{job, render_cpu, render_gpu, scene_file, scene_files};
+use crate::measured::{metal_file, nylon_file};
 use gpu_trace::film::Film;
 use gpu_trace::materials::MaterialKind;
 use gpu_trace::scene::Scene;
+use gpu_trace::scene::load::load_str_in;
 use gpu_trace::settings::{GeometryChoice, Integrator, Settings};
 use gpu_trace::statistics::mean_and_error;
 use gpu_trace::verify::{image_bits, means, settings};
@@ -185,6 +188,74 @@ fn perturbed(scene: &Scene, factor: f64) -> Scene {
         }
     }
     scene
+}
+
+/// Balls of a measured metal and of measured nylon, from files of the MERL database's format: one is as narrow as its
+/// entries allow, the other wide; they see each other, a floor and a lamp.
+fn measured_balls() -> Scene {
+    const BALLS: &str = r#"
+        camera = { position = [0, 1.2, 5], look_at = [0, 0.6, 0], fov = 40 }
+        image = { width = 48, height = 48 }
+        environment = { radiance = [0.4, 0.5, 0.6] }
+        [material.floor]
+        type = "diffuse"
+        albedo = [0.6, 0.5, 0.4]
+        [material.metal]
+        type = "measured"
+        file = "metal.binary"
+        [material.nylon]
+        type = "measured"
+        file = "nylon.binary"
+        scale = [2.0, 1.5, 1.0]
+        [material.lamp]
+        type = "diffuse"
+        albedo = [0, 0, 0]
+        emission = [6, 5, 4]
+        [[sphere]]
+        center = [0, -20, 0]
+        radius = 20
+        material = "floor"
+        [[sphere]]
+        center = [-0.75, 0.7, 0]
+        radius = 0.7
+        material = "metal"
+        [[sphere]]
+        center = [0.75, 0.6, 0.3]
+        radius = 0.6
+        material = "nylon"
+        [[sphere]]
+        center = [1, 3, 2]
+        radius = 0.7
+        material = "lamp"
+    "#;
+    let folder = Folder::new();
+    folder.write("metal.binary", metal_file());
+    folder.write("nylon.binary", nylon_file());
+    let loaded = load_str_in("balls", BALLS, &folder.path(""));
+    loaded.unwrap_or_else(|e| panic!("{e}")).scene
+}
+
+#[test]
+fn measured_materials_agree_with_the_reference() {
+    let scene = measured_balls();
+    let settings = settings(&scene, 48, 48, 64);
+    let reference = render_cpu(&scene, &settings);
+    let film = render_gpu(&scene, &settings);
+    let verdict = Verdict::of(&film, &reference);
+    eprintln!("{verdict:?}");
+    let holds = verdict.passes() && film.tally().non_finite == 0;
+    let what = format!("{verdict:?}, {:?}", film.tally());
+    assert_alike("measured", &film, &reference, holds, what);
+    // Companions: all colours 1 % darker; and of each of the two alone, the other's table.
+    let wrong = perturbed(&scene, 0.99);
+    let verdict = Verdict::of(&render_gpu(&wrong, &settings), &reference);
+    assert!(!verdict.passes(), "{verdict:?}");
+    for ball in [1, 2] {
+        let mut wrong = scene.clone();
+        wrong.spheres[ball].material = scene.spheres[3 - ball].material;
+        let verdict = Verdict::of(&render_gpu(&wrong, &settings), &reference);
+        assert!(!verdict.passes(), "{verdict:?}");
+    }
 }
 
 #[test]

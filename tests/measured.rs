@@ -79,6 +79,19 @@ fn file_of(material: &(dyn Bsdf + Sync)) -> Vec<u8> {
 
 static NYLON: LazyLock<Vec<u8>> = LazyLock::new(|| file_of(&Nylon::default()));
 
+/// A file that was measured of nylon.
+pub(crate) fn nylon_file() -> &'static [u8] {
+    &NYLON
+}
+
+/// A file that was measured of copper of a roughness of 0.4.
+pub(crate) fn metal_file() -> Vec<u8> {
+    file_of(&Conductor {
+        roughness: 0.4,
+        ..metal()
+    })
+}
+
 fn measured(bytes: &[u8]) -> Measured {
     let table = parse(bytes).unwrap_or_else(|e| panic!("{e}"));
     Measured::of("test.binary", Arc::new(table), DVec3::ONE)
@@ -211,11 +224,7 @@ fn a_table_of_nylon_is_nylon() {
 
 #[test]
 fn the_device_reads_whole_tables() {
-    let metal = Conductor {
-        roughness: 0.4,
-        ..metal()
-    };
-    let both = [measured(&file_of(&metal)), measured(&NYLON)];
+    let both = [measured(&metal_file()), measured(&NYLON)];
     let kinds = both.map(MaterialKind::from).into();
     let subjects = Subjects::of(&gpu(), kinds, Integrator::Bsdf).unwrap_or_else(|e| panic!("{e}"));
     for subject in 0..2 {

@@ -43,6 +43,8 @@ use asked::when;
 pub struct Effects {
     /// By the table's rows; empty for what nothing asked for.
     reasons: Vec<Vec<String>>,
+    /// Whether microfacets shadow and mask independently of each other: no scene and no option asks for that.
+    separable: bool,
 }
 
 impl Effects {
@@ -55,7 +57,10 @@ impl Effects {
             settings,
         };
         let reasons = table().iter().map(|row| (row.why)(&asked)).collect();
-        Self { reasons }
+        Self {
+            reasons,
+            separable: false,
+        }
     }
 
     /// The same and `more`, for the reason `why`.
@@ -70,6 +75,17 @@ impl Effects {
         with
     }
 
+    /// The same with G1(o) G1(i) for the shadowing and masking of GGX microfacets in the kernel, for comparisons with
+    /// renderers that have it so. The reference in f64 does not.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn with_separable_shadowing(self) -> Self {
+        Self {
+            separable: true,
+            ..self
+        }
+    }
+
     /// Exactly these effects, for tests of the linker.
     #[must_use]
     pub fn of(effects: &[Effect]) -> Self {
@@ -78,6 +94,7 @@ impl Effects {
             .map(|row| when(effects.contains(&row.effect), || "asked for".to_owned()));
         Self {
             reasons: reasons.collect(),
+            separable: false,
         }
     }
 
@@ -237,6 +254,7 @@ impl Effects {
             ("mixed_textures", self.has_mixes() && self.has_textures()),
             ("weighed", self.weighs_lights()),
             ("sampled", self.samples_light()),
+            ("separable", self.separable),
             (
                 "signed",
                 self.has(Effect::Dispersion) || self.has(Effect::RadianceCache),

@@ -19,7 +19,7 @@ pub(super) fn rows() -> Vec<Row> {
         let row = Row::new(Effect::Form(code), form.name, form.what, move |asked| {
             asked.surfaces(|material| material.forms().any(|own| own == *form))
         })
-        .marks(["sample", "evaluate", "share"].map(|what| format!("{what}_{}", form.name)));
+        .marks(["sample", "evaluate", "share", "find"].map(|what| format!("{what}_{}", form.name)));
         if form.transmits {
             row.needs([Effect::Interior])
         } else if mix::is_mix(form) {

@@ -23,7 +23,8 @@ pub struct Form {
     /// Whether it reflects by Lambert's law and does nothing else, so that values of cells can stand for what it
     /// reflects.
     pub lambertian: bool,
-    /// Whether it looks at where on the sphere the point is: `Surface::offset`, which no other kernel has.
+    /// Whether it looks at where on the sphere the point is: `Surface::offset`, which no other kernel has. The kernel asks
+    /// it once a vertex, by `find_NAME(surface)`, and keeps the answer in `Surface::found`.
     pub offset: bool,
     /// Members of the kernel's `Material` that it reads, besides those that all have.
     pub members: &'static [Member],

@@ -96,6 +96,9 @@ pub(super) fn module(effects: &Effects) -> String {
                 "import package::materials::{module}::evaluate_{name};"
             );
         }
+        if form.offset {
+            let _ = writeln!(text, "import package::materials::{module}::find_{name};");
+        }
     }
     if effects.has_textures() {
         text += &textures::imports(effects);
@@ -136,6 +139,11 @@ pub(super) fn module(effects: &Effects) -> String {
     );
     text += &dispatch("surface.material", evaluated, NO_VALUE);
     text += "}\n";
+    if effects.looks_at_offset() {
+        let found = forms.iter().map(|(code, form)| (*code, found(form)));
+        let found = dispatch("surface.material", found.collect(), FOUND_NOTHING);
+        let _ = writeln!(text, "fn find(surface: Surface) -> vec3f {{\n{found}}}");
+    }
     if let Some((_, form)) = mixed {
         text += &mixes::functions(form, &forms, lecture, deltas);
         text += &predicate("is_mix", &forms, mix::is_mix);
@@ -157,6 +165,17 @@ fn evaluated(form: &Form) -> String {
     match form.delta {
         true => NO_VALUE.into(),
         false => format!("return evaluate_{}(surface, wo, wi);", form.name),
+    }
+}
+
+/// What `find` says of what looks for nothing.
+const FOUND_NOTHING: &str = "return vec3f(0.0);";
+
+/// What `find` does for a form.
+fn found(form: &Form) -> String {
+    match form.offset {
+        true => format!("return find_{}(surface);", form.name),
+        false => FOUND_NOTHING.into(),
     }
 }
 

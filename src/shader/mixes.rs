@@ -32,6 +32,10 @@ pub(super) fn functions(
     deltas: bool,
 ) -> String {
     let name = form.name;
+    let found = match forms.iter().any(|(_, form)| form.offset) {
+        true => "part.found = find(part);\n",
+        false => "",
+    };
     // Uniform directions but for delta lobes.
     let uniform = match (lecture, deltas) {
         (false, _) => String::new(),
@@ -51,7 +55,7 @@ pub(super) fn functions(
     let mut text = format!(
         "fn sample(surface: Surface, wo: vec3f, u: vec4f) -> BsdfSample {{\n\
          var part = surface;\nvar v = u;\nvar own = NO_PART;\n\
-         if is_mix(surface.material) {{\n{uniform}{chosen}}}\n\
+         if is_mix(surface.material) {{\n{uniform}{chosen}}}\n{found}\
          let s = sample_part(part, wo, v);\n\
          if own == NO_PART {{ return s; }}\n\
          return sample_{name}(surface, wo, s, own);\n}}\n\

@@ -70,6 +70,26 @@ impl Kernel {
             .collect()
     }
 
+    /// Bytes of the variables of the entry point `entry`, as naga lays them out: the state that its loop carries from one
+    /// turn to the next, which a driver keeps in registers or in memory of each invocation. 0, if there is no such
+    /// entry point.
+    ///
+    /// # Panics
+    /// Never: a module that is valid has a layout.
+    #[must_use]
+    pub fn state_bytes(&self, entry: &str) -> u32 {
+        let mut layouter = naga::proc::Layouter::default();
+        let laid_out = layouter.update(self.module.to_ctx());
+        laid_out.expect("a module that is valid has a layout");
+        let entries = self.module.entry_points.iter().filter(|e| e.name == entry);
+        entries
+            .flat_map(|e| e.function.local_variables.iter())
+            // What has no name is naga's own, for a single expression.
+            .filter(|(_, variable)| variable.name.is_some())
+            .map(|(_, variable)| layouter[variable.ty].size)
+            .sum()
+    }
+
     /// Name, offset and size in bytes of every member of the struct type `name` (as the linker
     /// named it: the end of the name is enough), and the struct's own size.
     #[must_use]

@@ -6,6 +6,7 @@
 
 mod asking;
 mod links;
+mod state;
 
 use crate::common::{scene_file, scene_files};
 use crate::thorough::thorough;

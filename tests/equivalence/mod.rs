@@ -89,6 +89,44 @@ fn picture(film: &Film, other: &Independent) -> Picture {
     Picture::new(rect.width, rect.height, pixels.collect())
 }
 
+/// Fails unless `film` is what `other` says.
+#[track_caller]
+pub(crate) fn holds(name: &str, film: &Film, other: &Independent, demand: Demand) {
+    let verdict = compare(other, film, demand);
+    println!(
+        "{name}: worst pixel z {:.2} (limit {:.2}), pooled z {:.2}, bias within {:.4} %",
+        verdict.worst_pixel,
+        verdict.limit,
+        verdict.pooled,
+        100.0 * verdict.bias
+    );
+    let reference = picture(film, other);
+    let what = "it differs from the reference";
+    if let Some(fault) = fault_of(name, film, &reference, verdict.passes(), what) {
+        panic!("{fault}");
+    }
+}
+
+/// Fails if `film`, in which something is `wrong`, is what `other` says.
+#[track_caller]
+pub(crate) fn is_found(name: &str, wrong: &str, film: &Film, other: &Independent, demand: Demand) {
+    let verdict = compare(other, film, demand);
+    assert!(!verdict.passes(), "{name}: {wrong} is not noticed");
+}
+
+/// The scene with all albedos 1 % lower.
+pub(crate) fn darker(scene: &Scene) -> Scene {
+    let mut darker = scene.clone();
+    for material in &mut darker.materials {
+        match &mut material.kind {
+            MaterialKind::Diffuse(m) => m.albedo *= 0.99,
+            MaterialKind::Mirror(m) => m.reflectance *= 0.99,
+            _ => {}
+        }
+    }
+    darker
+}
+
 /// Renders `scene` and holds it to what `other` says of it; then, as the companion, with all albedos 1 % lower.
 ///
 /// # Panics
@@ -98,31 +136,7 @@ pub(crate) fn check(name: &str, scene: &Scene, other: &Independent, demand: Dema
         let settings = settings(scene, scene.width, scene.height, demand.spp);
         render_gpu(scene, &settings)
     };
-    let film = render(scene);
-    let verdict = compare(other, &film, demand);
-    println!(
-        "{name}: worst pixel z {:.2} (limit {:.2}), pooled z {:.2}, bias within {:.4} %",
-        verdict.worst_pixel,
-        verdict.limit,
-        verdict.pooled,
-        100.0 * verdict.bias
-    );
-    let reference = picture(&film, other);
-    let what = "it differs from the reference";
-    if let Some(fault) = fault_of(name, &film, &reference, verdict.passes(), what) {
-        panic!("{fault}");
-    }
-    let mut wrong = scene.clone();
-    for material in &mut wrong.materials {
-        match &mut material.kind {
-            MaterialKind::Diffuse(m) => m.albedo *= 0.99,
-            MaterialKind::Mirror(m) => m.reflectance *= 0.99,
-            _ => {}
-        }
-    }
-    let verdict = compare(other, &render(&wrong), demand);
-    assert!(
-        !verdict.passes(),
-        "{name}: an albedo 1 % lower is not noticed"
-    );
+    holds(name, &render(scene), other, demand);
+    let film = render(&darker(scene));
+    is_found(name, "an albedo 1 % lower", &film, other, demand);
 }

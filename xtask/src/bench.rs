@@ -3,7 +3,9 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use crate::{cargo, forecasts, program, run};
+use serde_json::Value;
+
+use crate::{cargo, forecasts, program, root, run};
 
 const USAGE: &str = "\
 Usage: cargo xtask bench [TABLE...] [--quick]
@@ -19,7 +21,7 @@ Usage: cargo xtask bench [TABLE...] [--quick]
   roofline   the peak of the ray-sphere test on the device, and what share of it scenes reach
   loading    from a scene file to the first dispatch: each stage for 1e3, 1e4 and 1e5 spheres
   forecasts  what price says of five scenes, and what the renders then take (some minutes)
-  resources  time to the first window, peak memory
+  resources  time to the first window, peak memory, what the loop over vertices carries
   peers      Mitsuba 3 on the same scenes (installs it into target/peers with pip; needs LLVM 19,
              as of Debian's libllvm19, for its compiled variant; takes a quarter of an hour, with
              --quick a minute, on small images that show no more than that it works)
@@ -135,7 +137,40 @@ fn resources() -> Result<(), String> {
         None => println!("| peak memory | not known on this system |"),
     }
     println!();
-    std::fs::remove_dir_all(&folder).map_err(|e| e.to_string())
+    std::fs::remove_dir_all(&folder).map_err(|e| e.to_string())?;
+    states()
+}
+
+/// What the kernel's loop carries from one vertex to the next, for scenes from few effects to many.
+fn states() -> Result<(), String> {
+    println!("| scene | lines of its kernel | bytes that its loop carries |\n|---|---|---|");
+    for scene in [
+        "lecture",
+        "glass",
+        "field",
+        "car-paint",
+        "frosted-glass",
+        "prism",
+        "mix",
+        "motion",
+        "scenes/textures.toml",
+        "scenes/sky.toml",
+        "scenes/everything.toml",
+    ] {
+        let output = Command::new(program("release"))
+            .args(["effects", scene, "--integrator", "path", "--json"])
+            .current_dir(root())
+            .output()
+            .map_err(|e| e.to_string())?;
+        let told: Value = serde_json::from_slice(&output.stdout)
+            .map_err(|e| format!("gpu-trace effects {scene}: {e}"))?;
+        println!(
+            "| `{scene}` | {} | {} |",
+            told["kernel_lines"], told["state_bytes"]
+        );
+    }
+    println!();
+    Ok(())
 }
 
 /// The largest resident size in KiB that Linux reports of a child while it runs.

@@ -49,7 +49,7 @@ const PICTURES: [Picture; 12] = [
     },
     Picture {
         name: "prism",
-        command: "prism --size 400x300 --spp 2048",
+        command: "prism --size 256x192 --spp 8192 --adaptive",
         text: "Glass whose index depends on the wavelength: the light that a lamp sends through it falls apart.",
     },
     Picture {

@@ -75,7 +75,7 @@ pub(super) fn run(args: &EffectsArgs) -> Result<()> {
     if args.measure {
         return prices::of_scene(args, &loaded, &settings);
     }
-    let lines = kernel.wgsl.lines().count();
+    let (lines, state) = (kernel.wgsl.lines().count(), kernel.state_bytes("render"));
     if args.json {
         let rows: Vec<_> = effects
             .rows()
@@ -87,7 +87,7 @@ pub(super) fn run(args: &EffectsArgs) -> Result<()> {
             })
             .collect();
         return print_json(&serde_json::json!({
-            "scene": loaded.name, "geometry": effects.geometry(), "kernel_lines": lines,
+            "scene": loaded.name, "geometry": effects.geometry(), "kernel_lines": lines, "state_bytes": state,
             "integrator": settings.integrator.name(), "choice": choice.as_ref().map(choice_json),
             "effects": rows,
         }));
@@ -96,7 +96,7 @@ pub(super) fn run(args: &EffectsArgs) -> Result<()> {
     if let Some(why) = job.cache_obstacle() {
         let _ = writeln!(chosen, "\n--radiance-cache is off: {why}");
     }
-    print(&(table(&loaded.name, effects, lines) + &chosen))
+    print(&(table(&loaded.name, effects, [lines, state as usize]) + &chosen))
 }
 
 fn print_json(value: &serde_json::Value) -> Result<()> {
@@ -152,8 +152,11 @@ fn choice_json(choice: &Choice) -> serde_json::Value {
     })
 }
 
-fn table(scene: &str, effects: &Effects, lines: usize) -> String {
-    let mut text = format!("{scene}: a kernel of {lines} lines\n\nIn the kernel\n");
+/// Of a kernel of so many lines, whose loop carries so many bytes.
+fn table(scene: &str, effects: &Effects, [lines, state]: [usize; 2]) -> String {
+    let mut text = format!(
+        "{scene}: a kernel of {lines} lines, whose loop carries {state} bytes\n\nIn the kernel\n"
+    );
     let width = effects.rows().map(|(row, _)| row.name.len()).max();
     let width = width.unwrap_or(0);
     for (row, reasons) in effects.rows().filter(|(_, r)| !r.is_empty()) {
