@@ -41,6 +41,7 @@ mod hazards;
 mod input;
 mod job;
 mod layout;
+mod lamp_images;
 mod ledger;
 mod library;
 mod lights;
