@@ -20,10 +20,11 @@ use crate::thorough::thorough;
 const SIZE: u32 = 64;
 const BLOCK: u32 = 8;
 
-/// A camera over a floor, with the spheres of a case.
+/// A camera over a floor, with the spheres of a case. All of the floor that it sees is near to them: far away samples that
+/// find an image by chance are so few that none of them tells the variance.
 fn floor(spheres: &str) -> Scene {
     scene(&format!(
-        "[camera]\nposition = [0, 3, 6]\nlook_at = [0, 0.3, 0]\nfov = 40.0\n[image]\nwidth = 64\nheight = 64\n\
+        "[camera]\nposition = [0, 5, 4]\nlook_at = [0, 0.3, 0]\nfov = 28.0\n[image]\nwidth = 64\nheight = 64\n\
          [material.gray]\ntype = \"diffuse\"\nalbedo = [0.7, 0.6, 0.5]\n\
          [material.lamp]\ntype = \"diffuse\"\nalbedo = [0.5, 0.5, 0.5]\nemission = [20, 18, 15]\n\
          [material.mirror]\ntype = \"mirror\"\nreflectance = [0.9, 0.8, 0.7]\n\
@@ -49,7 +50,7 @@ fn cases() -> Vec<(&'static str, Scene, bool)> {
             of(&[
                 ([-1.2, 0.8, 0.0], 0.7, "mirror"),
                 ([1.0, 0.7, 0.5], 0.7, "glass"),
-                ([0.5, 3.0, -1.0], 0.4, "lamp"),
+                ([0.5, 3.0, -1.0], 0.8, "lamp"),
             ]),
             true,
         ),
@@ -57,7 +58,7 @@ fn cases() -> Vec<(&'static str, Scene, bool)> {
             "a lamp at the horizon of a sphere on the floor",
             of(&[
                 ([0.0, 0.5, 0.0], 0.5, "mirror"),
-                ([1.5, 0.3, 0.0], 0.3, "lamp"),
+                ([2.0, 0.8, 0.0], 0.8, "lamp"),
             ]),
             true,
         ),
@@ -91,8 +92,8 @@ fn cases() -> Vec<(&'static str, Scene, bool)> {
             of(&[
                 ([-0.8, 0.8, 0.0], 0.8, "glass"),
                 ([0.9, 0.8, 0.0], 0.8, "mirror"),
-                ([-0.5, 3.0, 1.0], 0.1, "lamp"),
-                ([0.8, 2.5, 1.5], 0.15, "lamp"),
+                ([-0.5, 3.0, 1.0], 0.3, "lamp"),
+                ([0.8, 2.5, 1.5], 0.25, "lamp"),
             ]),
             true,
         ),
@@ -137,7 +138,6 @@ fn blocks(film: &Film) -> Vec<[f64; 2]> {
 fn apart(a: &Film, b: &Film) -> [f64; 3] {
     let z = |([a, v], [b, w]): ([f64; 2], [f64; 2])| (a - b) / (v + w).sqrt();
     let (a, b) = (blocks(a), blocks(b));
-    for i in 0..a.len() { let (x,y)=(a[i],b[i]); let q=(x[0]-y[0])/(x[1]+y[1]).sqrt(); if q.abs()>5.0 { eprintln!("block {} {} c{}: {:?} {:?} z {q:.1}", i/3%8, i/24, i%3, x, y); } }
     let (last, first) = (a[a.len() - 1], b[b.len() - 1]);
     let mut all: Vec<f64> = std::iter::zip(a, b).map(z).collect();
     let total = all.pop().unwrap_or_default();

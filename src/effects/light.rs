@@ -161,7 +161,9 @@ pub(super) fn rows() -> Vec<Row> {
         )
         .needs([Effect::Mis])
         .needs([Effect::Projected])
-        .needs(forms_that(|form| ["mirror", "dielectric"].contains(&form.name)))
+        .needs(forms_that(|form| {
+            ["mirror", "dielectric"].contains(&form.name)
+        }))
         .excludes([
             Effect::Lecture,
             Effect::Straddle,
@@ -180,7 +182,14 @@ pub(super) fn rows() -> Vec<Row> {
             Effect::TextureImage,
         ])
         .excludes(forms_that(|form| form.is_translucent()))
-        .marks(["images", "imaging", "receive_image", "Departure::chain", "IMAGED"]),
+        .marks([
+            "light::images",
+            "lamp_images",
+            "imaging",
+            "receive_image",
+            "Departure::chain",
+            "IMAGED",
+        ]),
     ]
 }
 

@@ -72,7 +72,8 @@ pub(super) fn of(
     spheres: &[PlacedSphere],
     lights: &Lights,
 ) -> Option<Vec<LampImage>> {
-    let small = |s: &PlacedSphere| s.pole.is_none() && matches!(s.side, Side::Outside | Side::Tracked);
+    let small =
+        |s: &PlacedSphere| s.pole.is_none() && matches!(s.side, Side::Outside | Side::Tracked);
     let makers = spheres.iter().enumerate().filter_map(|(i, sphere)| {
         let kind = &scene.materials[sphere.material].kind;
         Some((i, sphere, kind, smooth(kind).filter(|_| small(sphere))?))
@@ -95,7 +96,8 @@ pub(super) fn of(
             };
             // Reflected evenly in all directions (for parallel light on a mirror it is just so): over 4 pi R^2 in the place
             // of pi R^2. The lamp's solid angle is pi (r/distance)^2.
-            let sent = light.luminance * (lamp.radius / distance).powi(2) * std::f64::consts::PI / 4.0;
+            let sent =
+                light.luminance * (lamp.radius / distance).powi(2) * std::f64::consts::PI / 4.0;
             for (way, share) in ways {
                 if images.len() == MOST_IMAGES {
                     return None;

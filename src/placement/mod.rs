@@ -33,8 +33,8 @@ use crate::scene::{Scene, Sky};
 use crate::settings::Offset;
 use camera::approach;
 use cells::{Cells, Chart};
-use images::LampImage;
 use containment::{containers, reachable};
+use images::LampImage;
 use pole::{pole_normals, pole_point};
 
 /// A scene's spheres and camera as the renderers use them.

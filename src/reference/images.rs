@@ -204,14 +204,7 @@ impl PathTracer<'_> {
             if weight == DVec3::ZERO {
                 return None;
             }
-            ray = leave(
-                ray,
-                &hit,
-                &vertex,
-                s.wi,
-                crosses,
-                self.placement.offset,
-            );
+            ray = leave(ray, &hit, &vertex, s.wi, crosses, self.placement.offset);
             if crosses {
                 self.cross(&mut ray, &hit, None);
             }

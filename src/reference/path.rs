@@ -7,9 +7,9 @@ use super::scene::priority::{Media, cross_surface, filling, index_within, relati
 use super::scene::ray::{Hit, Ray, Vertex, leave, vertex_at};
 use super::scene::texture::{TexturePoint, emission_at, kind_at};
 use super::state::{Cache, Path, PathResult};
+use crate::effects::image_obstacle;
 use crate::film::LightClass;
 use crate::materials::{BsdfSample, Event, MaterialKind, Surface, sample_uniform};
-use crate::effects::image_obstacle;
 use crate::placement::images::LampImage;
 use crate::placement::{Medium, Placement};
 use crate::sampler::Sampler;

@@ -270,12 +270,12 @@ fn chart_of(text: &mut String, placement: &Placement) {
     *text += "return chart;\n}\n";
 }
 
-/// The module `images`: the images of lamps that vertices look for, whatever the form of the geometry.
+/// The module `lamp_images`: the images of lamps that vertices look for, whatever the form of the geometry.
 pub(super) fn images(placement: &Placement) -> String {
     let images = placement.images.as_deref().unwrap_or_default();
     let each = |value: &dyn Fn(&LampImage) -> String| images.iter().map(value).collect::<Vec<_>>();
     let mut text = format!(
-        "import package::light::images::LampImage;\nconst IMAGE_COUNT: u32 = {}u;\n\
+        "import package::light::images::LampImage;\nconst LAMP_IMAGE_COUNT: u32 = {}u;\n\
          fn image_of(index: u32) -> LampImage {{\nvar image: LampImage;\n",
         images.len()
     );

@@ -209,7 +209,7 @@ fn link_from(
     }
     if effects.has(Effect::LampImages) {
         let text = baked::images(placement);
-        resolver.add_module(module_path("images"), text.into());
+        resolver.add_module(module_path("lamp_images"), text.into());
     }
     let mut compiler = Wesl::new_barebones().set_custom_resolver(resolver);
     compiler

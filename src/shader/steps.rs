@@ -25,7 +25,7 @@ pub const LOOP_ITERATIONS: u64 = 65_000;
 const SPHERES_AN_ITERATION: usize = 8;
 
 /// Bins of an image's impact parameters, as in `shaders/light/images.wesl`.
-const BINS: usize = 8;
+const BINS: usize = 4;
 
 /// One loop of the path tracer's kernel.
 #[derive(Debug)]
@@ -177,17 +177,17 @@ pub const LOOPS: [Loop; 22] = [
         used: |effects| effects.has(Effect::LampImages),
         at_vertex: |placement, _| images(placement) + 1,
     },
-    // and its pdf asked for, there and where a path comes to a lamp.
+    // and the pdf of one asked for where a path comes to a lamp.
     Loop {
         function: "image_pdf",
         used: |effects| effects.has(Effect::LampImages),
-        at_vertex: |placement, _| 2 * (images(placement) + 1),
+        at_vertex: |placement, _| images(placement) + 1,
     },
-    // Over bins: for each of these.
+    // Over bins of what is seen, for each of the two.
     Loop {
         function: "bins_of",
         used: |effects| effects.has(Effect::LampImages),
-        at_vertex: |_, _| 3 * (BINS + 1),
+        at_vertex: |_, _| 2 * (BINS + 1),
     },
     // Over the surfaces on the way to one.
     Loop {

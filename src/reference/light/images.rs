@@ -30,7 +30,7 @@ use crate::placement::images::{LampImage, Way};
 use crate::sampling::directions::basis_around;
 
 /// Bins of the square of the impact parameter: their ends are even in the angle of incidence.
-pub const BINS: usize = 8;
+pub const BINS: usize = 4;
 
 /// An image as a vertex sees it, lengths in units of the radius of the sphere that makes it.
 #[derive(Clone, Copy, Debug)]
@@ -245,18 +245,16 @@ impl Sight {
         if total <= 0.0 {
             return None;
         }
-        let (mut seen, mut chosen, mut v) = (0.0, 0, u[0]);
-        for (i, weight) in bins.into_iter().enumerate().filter(|(_, w)| *w > 0.0) {
-            seen += weight;
-            let share = weight / seen;
-            if v < share {
-                (chosen, v) = (i, v / share);
-            } else {
-                v = ((v - share) / (1.0 - share)).min(1.0 - f64::EPSILON);
-            }
+        let (mut chosen, mut rest) = (0, u[0] * total);
+        while chosen + 1 < BINS && rest >= bins[chosen] {
+            rest -= bins[chosen];
+            chosen += 1;
+        }
+        if bins[chosen] <= 0.0 {
+            return None;
         }
         let size = end(chosen + 1) - end(chosen);
-        let place = end(chosen) + v * size;
+        let place = (end(chosen) + rest / bins[chosen] * size).min(1.0);
         let ring = self.ring(place);
         let width = ring.width();
         if width <= 0.0 {
@@ -300,5 +298,4 @@ impl Sight {
 }
 
 #[cfg(test)]
-#[path = "images_tests.rs"]
 mod tests;

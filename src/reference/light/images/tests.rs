@@ -42,7 +42,8 @@ fn sights(random: &mut Random, count: usize) -> Vec<Sight> {
             _ => random.range(0.0, PI),
         };
         let way = [Way::Reflected, Way::Through][i % 2];
-        let ior: Option<f64> = [None, Some(1.5), Some(1.5), Some(2.4), Some(0.7), Some(1.05)][i % 6];
+        let ior: Option<f64> =
+            [None, Some(1.5), Some(1.5), Some(2.4), Some(0.7), Some(1.05)][i % 6];
         Sight {
             axis,
             distance: 1.0 + random.magnitude(-2.0, 1.5),
@@ -73,8 +74,8 @@ fn arcs_off(scale: f64) -> (usize, usize) {
         for _ in 0..50 {
             let (u, phi) = (random.unit(), random.range(-PI, PI));
             let ring = sight.ring(u);
-            let said = phi.abs() < scale * ring.halves[0]
-                || (PI - phi.abs()) < scale * ring.halves[1];
+            let said =
+                phi.abs() < scale * ring.halves[0] || (PI - phi.abs()) < scale * ring.halves[1];
             let found = traced(&sight, direction(&sight, u, phi));
             // At the limb rounding may have it.
             if found.is_some_and(|missed| (missed.abs() - 1.0).abs() < 1.0e-6) {
@@ -170,7 +171,10 @@ fn p_value(sight: &Sight, scale: f64) -> f64 {
         let cosine = sight.axis.dot(s.wi);
         let u = (1.0 - cosine * cosine) * sight.distance.powi(2);
         let way = s.wi - cosine * sight.axis;
-        let phi = way.dot(sight.axis.cross(sight.side)).atan2(way.dot(sight.side)) + PI;
+        let phi = way
+            .dot(sight.axis.cross(sight.side))
+            .atan2(way.dot(sight.side))
+            + PI;
         let cell = |x: f64| ((x * SIDE as f64) as usize).min(SIDE - 1);
         counts[SIDE * cell(u) + cell(phi / (2.0 * PI))] += 1;
         // And both say the same of it, but next to the end of a bin.
@@ -194,8 +198,7 @@ fn p_value(sight: &Sight, scale: f64) -> f64 {
             let step = 2.0 * PI / SIDE as f64;
             let low = j as f64 * step - PI;
             let overlap = |from: f64, to: f64| (to.min(low + step) - from.max(low)).max(0.0);
-            let covered =
-                overlap(-near, near) + overlap(-PI, far - PI) + overlap(PI - far, PI);
+            let covered = overlap(-near, near) + overlap(-PI, far - PI) + overlap(PI - far, PI);
             let scale = if i < SIDE * FINE / 2 { scale } else { 1.0 };
             wanted[SIDE * (i / FINE) + j] += scale * pdf * covered / (SIDE * FINE) as f64;
         }
