@@ -77,8 +77,10 @@ impl Open {
     /// What may be taken in the place of `path`, where `settings` have that for what is left to the scene.
     #[must_use]
     pub fn rivals(self, settings: &Settings) -> Vec<Candidate> {
-        // Who says how lights are sampled wants them to be sampled, and the radiance cache is that of `path`.
-        let is_path = settings.light_sampling.is_some() || settings.radiance_cache;
+        // Who says how lights are sampled wants them to be sampled, and the radiance cache and images of lamps are those
+        // of `path`.
+        let is_path =
+            settings.light_sampling.is_some() || settings.radiance_cache || settings.lamp_images;
         let rivals = [
             (Candidate::Bsdf, self.integrator && !is_path),
             (

@@ -5,7 +5,7 @@
 //! [backend](crate::backend).
 
 use crate::claims::Claims;
-use crate::effects::{BAKED_MOST, Effect, Effects, cache_obstacle, conflict};
+use crate::effects::{BAKED_MOST, Effect, Effects, cache_obstacle, conflict, image_obstacle};
 use crate::error::{Error, Result};
 use crate::film::PILOT_SAMPLES;
 use crate::placement::cells::Cells;
@@ -99,6 +99,13 @@ impl Job {
         is_asked_for.then(why).flatten()
     }
 
+    /// Why vertices look for no images of lamps, where they are asked to.
+    #[must_use]
+    pub fn image_obstacle(&self) -> Option<&'static str> {
+        let why = || image_obstacle(&self.scene, &self.placement, &self.settings);
+        self.settings.lamp_images.then(why).flatten()
+    }
+
     /// What is known of a sample's variance.
     #[must_use]
     pub fn variance(&self) -> &VarianceReport {
@@ -135,6 +142,9 @@ impl Job {
         let used: Vec<Effect> = self.effects.used().collect();
         if let Some(conflict) = conflict(&used, more) {
             return Err(Error::Usage(conflict));
+        }
+        if more.contains(&Effect::LampImages) {
+            self.placement.images = Some(Vec::new());
         }
         self.effects = self.effects.with(more, why);
         if self.effects.has(Effect::RadianceCache) && self.cells().is_none() {

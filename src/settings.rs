@@ -44,6 +44,9 @@ pub struct Settings {
     /// Whether diffuse surfaces that paths come to from diffuse ones reflect by values of cells, drawn anew for every
     /// batch of samples and corrected without bias, where nothing [stands against it](crate::effects::cache_obstacle).
     pub radiance_cache: bool,
+    /// Whether vertices look for images of lamps that smooth spheres make, where nothing
+    /// [stands against it](crate::effects::image_obstacle).
+    pub lamp_images: bool,
     /// Whether paths end by Russian roulette on their throughput; `None`: as the estimator has it. The lecture's
     /// has its own, and no other.
     pub roulette: Option<bool>,
@@ -98,6 +101,7 @@ impl Settings {
             light_sampling: None,
             sampler: Sampler::default(),
             radiance_cache: false,
+            lamp_images: false,
             roulette: None,
             geometry: GeometryChoice::Auto,
             view: None,

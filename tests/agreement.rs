@@ -129,6 +129,46 @@ fn the_radiance_cache_agrees_with_the_reference() {
     }));
 }
 
+/// With images of lamps, in a form of the geometry; `cache`: and with the radiance cache.
+fn imaged(scene: &Scene, geometry: GeometryChoice, cache: bool) -> Settings {
+    let settings = Settings {
+        lamp_images: true,
+        radiance_cache: cache,
+        max_bounces: 64,
+        geometry,
+        ..settings(scene, 40, 40, 32)
+    };
+    let job = job(scene, &settings);
+    assert_eq!(job.image_obstacle(), None);
+    assert_eq!(job.cells().is_some(), cache);
+    settings
+}
+
+#[test]
+fn images_of_lamps_agree_with_the_reference() {
+    let cases = [
+        ("glass", GeometryChoice::Baked, false),
+        ("glass", GeometryChoice::List, true),
+        ("tests/mirror-ball", GeometryChoice::Baked, false),
+        ("tests/glass-ball", GeometryChoice::Bvh, false),
+    ];
+    check(cases.into_iter().map(|(name, form, cache)| {
+        let scene = scene_file(format!("scenes/{name}.toml"));
+        let settings = imaged(&scene, form, cache);
+        let what = format!("{name}, {}, images, cache {cache}", form.name());
+        (what, scene, settings)
+    }));
+}
+
+#[test]
+fn companion_one_percent_is_found_with_images_of_lamps() {
+    let scene = scene_file("scenes/glass.toml");
+    let settings = imaged(&scene, GeometryChoice::Auto, false);
+    let film = render_gpu(&perturbed(&scene, 0.99), &settings);
+    let verdict = Verdict::of(&film, &render_cpu(&scene, &settings));
+    assert!(!verdict.passes(), "{verdict:?}");
+}
+
 #[test]
 fn companion_one_percent_is_found_with_the_radiance_cache() {
     let scene = scene_file("scenes/lecture.toml");

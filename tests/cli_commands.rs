@@ -12,7 +12,7 @@ const COMMANDS: &str =
 const OPTIONS: &str = "--output --stats --aov --exposure --dump-wgsl --progress --quiet --verbose \
     --spp --adaptive --error --time --sample-range --size --crop --seed --integrator \
     --light-sampling --sampler --max-bounces \
-    --radiance-cache --roulette --termination --backend --device --offset --geometry --threads --allow-non-finite \
+    --radiance-cache --lamp-images --roulette --termination --backend --device --offset --geometry --threads --allow-non-finite \
     --color-by --radius-by --map --background --frames --view --checkpoint --checkpoint-every";
 
 #[test]

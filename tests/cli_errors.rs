@@ -76,6 +76,7 @@ fn options_are_refused_with_their_name_and_the_way_out() {
         --integrator bsdf --light-sampling cone | --light-sampling | --integrator bsdf does not
         --sampler random | --sampler | sobol, independent
         --roulette maybe | --roulette | on, off
+        --lamp-images maybe | --lamp-images | on, off
         --radiance-cache maybe | --radiance-cache | auto, on, off
         --backend tpu | --backend | auto, gpu, cpu
         --geometry grid | --geometry | auto, baked, list, bvh

@@ -40,6 +40,7 @@ mod fuzz;
 mod hazards;
 mod input;
 mod job;
+mod lamp_images;
 mod layout;
 mod ledger;
 mod library;

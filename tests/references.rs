@@ -152,7 +152,7 @@ fn sky() {
 #[test]
 fn textures() {
     holds_without(
-        "textures",
+        Reference::of("textures"),
         "axis = [0.5, 1.0, 0.3]",
         "axis = [0.52, 1.0, 0.3]",
     );

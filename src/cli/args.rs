@@ -236,6 +236,15 @@ pub struct RenderArgs {
         value_parser = choices::switch(),
         help_heading = "Light transport",
         hide_possible_values = true,
+        help = "Look for images of lamps in smooth mirrors and glass spheres, too, without bias [default: off]"
+    )]
+    pub lamp_images: Option<bool>,
+    #[arg(
+        long,
+        value_name = "on|off",
+        value_parser = choices::switch(),
+        help_heading = "Light transport",
+        hide_possible_values = true,
         help = "End weak paths early by Russian roulette, without bias [default: on]"
     )]
     pub roulette: Option<bool>,
@@ -450,6 +459,7 @@ impl RenderArgs {
             integrator: integrator.with_termination(termination),
             light_sampling: self.light_sampling,
             radiance_cache: self.radiance_cache == Some(Caching::On),
+            lamp_images: self.lamp_images == Some(true),
             roulette: self.roulette,
             sampler: self.sampler,
             geometry: self.geometry,

@@ -1,7 +1,7 @@
 //! Effects of where light comes from and how it is looked for.
 
 use super::surfaces::forms_that;
-use super::{Asked, Effect, Row, when};
+use super::{Asked, Effect, Row, image_obstacle, when};
 use crate::placement::lights::MOST_WEIGHED;
 use crate::scene::Environment;
 use crate::settings::{Integrator, LightSampling};
@@ -149,6 +149,47 @@ pub(super) fn rows() -> Vec<Row> {
         )
         .needs([Effect::Lights, Effect::Skylight])
         .marks(["mis_weight"]),
+        Row::new(
+            Effect::LampImages,
+            "lamp_images",
+            "light sampling: at every vertex a direction to an image of a lamp in a smooth sphere",
+            |asked| {
+                let is_used = asked.settings.lamp_images
+                    && image_obstacle(asked.scene, asked.placement, asked.settings).is_none();
+                when(is_used, || "--lamp-images on".into())
+            },
+        )
+        .needs([Effect::Mis])
+        .needs([Effect::Projected])
+        .needs(forms_that(|form| {
+            ["mirror", "dielectric"].contains(&form.name)
+        }))
+        .excludes([
+            Effect::Lecture,
+            Effect::Straddle,
+            Effect::Nested,
+            Effect::Nudge,
+            Effect::Ulp,
+            Effect::Motion,
+            Effect::Classes,
+            Effect::BvhCost,
+            Effect::Table,
+            Effect::Priority,
+            Effect::Absorption,
+            Effect::Dispersion,
+            Effect::TextureChecker,
+            Effect::TextureNoise,
+            Effect::TextureImage,
+        ])
+        .excludes(forms_that(|form| form.is_translucent()))
+        .marks([
+            "light::images",
+            "lamp_images",
+            "imaging",
+            "receive_image",
+            "Departure::chain",
+            "IMAGED",
+        ]),
     ]
 }
 

@@ -30,7 +30,7 @@ use crate::settings::Settings;
 
 pub use asked::Asked;
 pub use geometry::{BAKED_LIMIT, BAKED_MOST};
-pub use obstacle::cache_obstacle;
+pub use obstacle::{cache_obstacle, image_obstacle};
 pub use role::Role;
 pub use row::{Effect, Row, Why};
 pub use rules::{completed, conflict};

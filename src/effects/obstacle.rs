@@ -1,4 +1,4 @@
-//! Where the radiance cache is not used, and why.
+//! Where the radiance cache and images of lamps are not used, and why.
 
 use glam::DVec3;
 
@@ -17,6 +17,88 @@ const MOST_BOUNCES: u32 = 128;
 const MOST_PARTS: usize = 4;
 const MOST_MIXED_BOUNCES: u32 = DEFAULT_MAX_BOUNCES;
 
+/// What stands against whatever goes by ways of paths of its own, with the reason.
+fn obstacles(
+    scene: &Scene,
+    placement: &Placement,
+    settings: &Settings,
+) -> [(bool, &'static str); 12] {
+    [
+        (
+            settings.integrator != Integrator::Path,
+            "--integrator is not path",
+        ),
+        (settings.classes, "layers by the kind of path"),
+        (settings.view.is_some(), "--view"),
+        (settings.offset != Offset::Exact, "--offset is not exact"),
+        (placement.moves(), "spheres that move"),
+        (
+            kinds(scene, placement).any(|material| !material.textures.is_empty()),
+            "textures",
+        ),
+        (
+            kinds(scene, placement).any(|material| material.kind.dispersion().is_some()),
+            "dispersion",
+        ),
+        (
+            kinds(scene, placement).any(|material| material.kind.absorption() != DVec3::ZERO),
+            "absorption",
+        ),
+        (placement.media.levels > 0, "dielectrics that share points"),
+        (!placement.within.is_empty(), "a camera in a dielectric"),
+        (
+            placement.spheres.iter().any(|s| s.side == Side::Sign),
+            "a surface that the lens straddles",
+        ),
+        (
+            placement.spheres.iter().any(|s| s.container.is_some()),
+            "surfaces just within a dielectric",
+        ),
+    ]
+}
+
+/// The materials of all spheres.
+fn kinds<'a>(scene: &'a Scene, placement: &'a Placement) -> impl Iterator<Item = &'a Material> {
+    let spheres = placement.spheres.iter();
+    spheres.map(|sphere| &scene.materials[sphere.material])
+}
+
+fn first(mut obstacles: impl Iterator<Item = (bool, &'static str)>) -> Option<&'static str> {
+    obstacles.find(|(is, _)| *is).map(|(_, why)| why)
+}
+
+/// Why vertices look for no images of lamps; `None` where they can.
+#[must_use]
+pub fn image_obstacle(
+    scene: &Scene,
+    placement: &Placement,
+    settings: &Settings,
+) -> Option<&'static str> {
+    let own = [
+        (
+            kinds(scene, placement).any(|material| material.kind.is_translucent()),
+            "a surface that scatters light to its other side",
+        ),
+        (
+            placement.lights.from_table(settings.light_sampling()),
+            "lamps are drawn from a table",
+        ),
+        (
+            placement.lights.table.is_empty(),
+            "there is no lamp that light sampling looks for",
+        ),
+        (
+            placement.images.is_none(),
+            "more than 16 images of lamps in smooth spheres",
+        ),
+        (
+            placement.images.as_ref().is_some_and(Vec::is_empty),
+            "no smooth mirror or glass sphere is apart from a lamp",
+        ),
+    ];
+    first(obstacles(scene, placement, settings).into_iter().chain(own))
+}
+
 /// Why a render has no radiance cache; `None` where it can have one.
 #[must_use]
 pub fn cache_obstacle(
@@ -24,20 +106,12 @@ pub fn cache_obstacle(
     placement: &Placement,
     settings: &Settings,
 ) -> Option<&'static str> {
-    let kinds = || {
-        let spheres = placement.spheres.iter();
-        spheres.map(|sphere| &scene.materials[sphere.material])
-    };
     let sky = scene
         .environment
         .as_ref()
         .filter(|e| e.brightest() > 0.0 && !placement.enclosed);
     let has_sky = sky.and_then(Environment::sky).is_some();
-    let obstacles = [
-        (
-            settings.integrator != Integrator::Path,
-            "--integrator is not path",
-        ),
+    let own = [
         (
             settings.sampler != Sampler::Sobol,
             "--sampler is not sobol: there are no scrambles",
@@ -59,42 +133,18 @@ pub fn cache_obstacle(
             "--max-bounces is above 64, with a mix of materials",
         ),
         (settings.adaptive, "--adaptive"),
-        (settings.classes, "layers by the kind of path"),
-        (settings.view.is_some(), "--view"),
-        (settings.offset != Offset::Exact, "--offset is not exact"),
         (
             settings.geometry == GeometryChoice::Bvh || placement.spheres.len() > MOST_SPHERES,
             "a tree over the spheres",
         ),
-        (placement.moves(), "spheres that move"),
         (
-            kinds().any(|material| !material.textures.is_empty()),
-            "textures",
+            !kinds(scene, placement).any(Material::is_diffuse),
+            "no sphere is diffuse",
         ),
-        (
-            kinds().any(|material| material.kind.dispersion().is_some()),
-            "dispersion",
-        ),
-        (
-            kinds().any(|material| material.kind.absorption() != DVec3::ZERO),
-            "absorption",
-        ),
-        (placement.media.levels > 0, "dielectrics that share points"),
-        (!placement.within.is_empty(), "a camera in a dielectric"),
-        (
-            placement.spheres.iter().any(|s| s.side == Side::Sign),
-            "a surface that the lens straddles",
-        ),
-        (
-            placement.spheres.iter().any(|s| s.container.is_some()),
-            "surfaces just within a dielectric",
-        ),
-        (!kinds().any(Material::is_diffuse), "no sphere is diffuse"),
         (
             placement.lights.table.is_empty() && !has_sky,
             "there is no lamp, nor an image around all",
         ),
     ];
-    let first = obstacles.into_iter().find(|(is, _)| *is);
-    first.map(|(_, why)| why)
+    first(obstacles(scene, placement, settings).into_iter().chain(own))
 }

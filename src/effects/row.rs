@@ -73,6 +73,8 @@ pub enum Effect {
     Table,
     /// Multiple importance sampling.
     Mis,
+    /// Light sampling of images of lamps.
+    LampImages,
     /// Russian roulette on the throughput.
     Roulette,
     /// Values of cells in the place of paths.

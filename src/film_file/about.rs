@@ -125,6 +125,8 @@ pub struct Choices {
     /// Absent in files of before it was there.
     #[serde(default)]
     radiance_cache: bool,
+    #[serde(default)]
+    lamp_images: bool,
     roulette: bool,
     offset: String,
     adaptive: bool,
@@ -234,6 +236,7 @@ impl Choices {
             sampler: settings.sampler.name().into(),
             max_bounces: settings.max_bounces,
             radiance_cache: settings.radiance_cache,
+            lamp_images: settings.lamp_images,
             roulette: settings.has_roulette(),
             offset: settings.offset.to_string(),
             adaptive: settings.adaptive,
@@ -285,6 +288,7 @@ impl Choices {
             light_sampling: integrator.samples_lights().then_some(light_sampling),
             sampler: named("sampler", &self.sampler, Sampler::ALL, |s| s.name())?,
             radiance_cache: self.radiance_cache,
+            lamp_images: self.lamp_images,
             roulette: (!integrator.is_lecture()).then_some(self.roulette),
             geometry: named("geometry", &self.geometry, GeometryChoice::ALL, |g| {
                 g.name()

@@ -52,6 +52,8 @@ pub struct Stats {
     pub max_bounces: u32,
     /// Whether diffuse surfaces reflected by values of the radiance cache.
     pub radiance_cache: bool,
+    /// Whether vertices looked for images of lamps.
+    pub lamp_images: bool,
     /// Whether paths ended by Russian roulette.
     pub roulette: bool,
     /// Where the time went.

@@ -9,6 +9,7 @@
 mod camera;
 pub mod cells;
 pub mod containment;
+pub mod images;
 pub mod lights;
 pub mod media;
 mod pole;
@@ -33,6 +34,7 @@ use crate::settings::Offset;
 use camera::approach;
 use cells::{Cells, Chart};
 use containment::{containers, reachable};
+use images::LampImage;
 use pole::{pole_normals, pole_point};
 
 /// A scene's spheres and camera as the renderers use them.
@@ -61,6 +63,8 @@ pub struct Placement {
     pub offset: Offset,
     /// What light sampling chooses from.
     pub lights: Lights,
+    /// Images of these that smooth spheres make; `None` if they are too many.
+    pub images: Option<Vec<LampImage>>,
     /// The most parts of a sphere's mix, and the most weights of one that are textures.
     pub mixed: [usize; 2],
     /// Made when it is first asked for, and so is the next.
@@ -158,12 +162,14 @@ impl Placement {
         let poles = spheres.iter().filter(|s| s.pole.is_some()).count();
         let camera = PlacedCamera::new(scene, forward, approach, scale, width, height);
         let offset = offset.scaled(scale);
+        let lights = Lights::new(scene, &spheres, offset);
         Self {
             scale,
             radiance_scale: unit::radiance(scene, &order, enclosed),
             enclosed,
             coincident,
-            lights: Lights::new(scene, &spheres, offset),
+            images: images::of(scene, &spheres, &lights),
+            lights,
             mixed: mixed(scene, &spheres),
             spheres,
             poles,

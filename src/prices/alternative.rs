@@ -179,6 +179,10 @@ fn change(
             settings.radiance_cache = false;
             "--radiance-cache off"
         }
+        Effect::LampImages => {
+            settings.lamp_images = false;
+            "--lamp-images off"
+        }
         Effect::Roulette => {
             settings.roulette = Some(false);
             "--roulette off"

@@ -9,10 +9,11 @@ use crate::image::Picture;
 use crate::materials::{
     ALL, MaterialKind,
     dielectric::{Dielectric, Glass},
+    diffuse::Diffuse,
     forms,
     texturable::{texturable_key, textured_keys},
 };
-use crate::materials::{Texture, TextureImage};
+use crate::materials::{Material, Texture, TextureImage};
 use crate::scene::load::load_str;
 use crate::scene::{Environment, Gradient, Scene, Sky, Sphere, builtin};
 use crate::settings::{
@@ -137,6 +138,29 @@ pub fn standard(effect: Effect) -> (Scene, Settings) {
                 .scene;
             (scene.width, scene.height) = (settings.width, settings.height);
             settings.max_bounces = Settings::for_scene(&scene).max_bounces;
+        }
+        Effect::LampImages => {
+            settings.lamp_images = true;
+            set_ball(&mut scene, Dielectric::smooth(1.5));
+            // What its images light.
+            let floor = Sphere {
+                center: DVec3::new(0.0, -101.0, 0.0),
+                radius: 100.0,
+                ..scene.spheres[0]
+            };
+            let glass = scene.materials[floor.material].clone();
+            scene.materials.push(Material {
+                name: "floor".into(),
+                kind: Diffuse {
+                    albedo: DVec3::splat(0.5),
+                }
+                .into(),
+                ..glass
+            });
+            scene.spheres.push(Sphere {
+                material: scene.materials.len() - 1,
+                ..floor
+            });
         }
         Effect::Table => settings.light_sampling = Some(LightSampling::Cone),
         Effect::Baked

@@ -7,6 +7,7 @@
 
 pub mod cells;
 mod direct;
+mod images;
 pub mod light;
 pub mod path;
 pub mod scene;

@@ -7,11 +7,13 @@ use super::scene::priority::{Media, cross_surface, filling, index_within, relati
 use super::scene::ray::{Hit, Ray, Vertex, leave, vertex_at};
 use super::scene::texture::{TexturePoint, emission_at, kind_at};
 use super::state::{Cache, Path, PathResult};
+use crate::effects::image_obstacle;
 use crate::film::LightClass;
 use crate::materials::{BsdfSample, Event, MaterialKind, Surface, sample_uniform};
+use crate::placement::images::LampImage;
 use crate::placement::{Medium, Placement};
 use crate::sampler::Sampler;
-use crate::sampling::purpose::{CAMERA, TIME, WAVELENGTH, lighting, scattering};
+use crate::sampling::purpose::{CAMERA, TIME, WAVELENGTH, imaging, lighting, scattering};
 use crate::sampling::random::{random4, sample_key};
 use crate::sampling::sobol::sobol4;
 use crate::sampling::spectrum::sample_wavelength;
@@ -55,13 +57,22 @@ pub struct PathTracer<'a> {
     pub settings: &'a Settings,
     /// The radiance cache for the batch of the samples that are traced, if there is one.
     pub cache: Option<Cache<'a>>,
+    /// The images of lamps that vertices look for.
+    pub images: &'a [LampImage],
 }
 
 impl<'a> PathTracer<'a> {
     /// One that renders as `settings` say, without a cache.
     #[must_use]
     pub fn new(scene: &'a Scene, placement: &'a Placement, settings: &'a Settings) -> Self {
+        let has_images =
+            settings.lamp_images && image_obstacle(scene, placement, settings).is_none();
         Self {
+            images: placement
+                .images
+                .as_deref()
+                .filter(|_| has_images)
+                .unwrap_or_default(),
             scene,
             placement,
             settings,
@@ -143,7 +154,8 @@ impl PathTracer<'_> {
         let point = self.point_at(&hit, &vertex);
         let kind = kind_at(material, &point);
         let kind = &*kind;
-        let share = self.share_of_emission(&path.ray, &hit, path.departure);
+        let share = self.share_of_emission(&path.ray, &hit, path.departure)
+            * self.share_of_image(path.chain.as_ref(), &hit);
         let emission = emission_at(material, &point);
         path.receive(path.class, path.throughput * share * emission);
         self.keep_wavelength(path, kind, random);
@@ -182,6 +194,13 @@ impl PathTracer<'_> {
             path.found.shadow_rays += direct.rays;
             path.found.connections += u32::from(direct.event.is_some());
             path.departure.pdf_per_weight = direct.pdf_per_weight;
+        }
+        if !self.images.is_empty() {
+            let [.., z, w] = random(imaging(path.found.bounces));
+            let found = self.image_light(path, &hit, &vertex, (kind, &surface), [z, w]);
+            path.receive(path.class, path.throughput * found.radiance);
+            path.found.rays += found.rays;
+            path.found.shadow_rays += found.rays;
         }
         let s = self.sample(kind, &surface, wo, u);
         let goes_on = self.go_on(path, &hit, &vertex, &s, u[3]);
@@ -246,6 +265,7 @@ impl PathTracer<'_> {
     fn go_on(&self, path: &mut Path, hit: &Hit, vertex: &Vertex, s: &BsdfSample, u: f64) -> bool {
         path.class = next_class(path.class, s.event);
         path.departure.pdf = s.pdf;
+        self.follow_chain(path, hit, vertex, s);
         if !vertex.both_sides {
             path.departure.pdf_per_weight *= vertex.normal.dot(s.wi).max(0.0);
         }

@@ -36,6 +36,8 @@ pub(super) struct Path {
     /// That it keeps, in nm.
     pub(super) wavelength: Option<f64>,
     pub(super) departure: Departure,
+    /// What images of lamps have left of it since the last vertex at which they were looked for.
+    pub(super) chain: Option<Chain>,
     pub(super) class: LightClass,
     pub(super) found: PathResult,
     /// Whether it asks no cell of the radiance cache: it is a pilot's, or corrects a value.
@@ -55,6 +57,32 @@ pub(super) struct Departure {
     pub(super) pdf_per_weight: f64,
 }
 
+/// A path's way from a vertex at which images of lamps were looked for.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Chain {
+    /// That vertex.
+    pub(super) anchor: DVec3,
+    pub(super) offset: DVec3,
+    pub(super) normal: DVec3,
+    /// In which it left it, and with which pdf the BSDF has found that.
+    pub(super) direction: DVec3,
+    pub(super) pdf: f64,
+    pub(super) stage: Stage,
+}
+
+/// Where on such a way it is, with the sphere that it has met.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Stage {
+    /// It has left the vertex.
+    Left,
+    /// It is in the sphere.
+    Entered(usize),
+    /// It has been reflected.
+    Reflected(usize),
+    /// It has come out of the sphere.
+    Through(usize),
+}
+
 /// Where a part of a path begins.
 pub(super) struct Begin {
     pub(super) ray: Ray,
@@ -72,6 +100,7 @@ impl Path {
             eta_scale: 1.0,
             wavelength: None,
             departure: Departure::default(),
+            chain: None,
             class: LightClass::Emission,
             found: PathResult::default(),
             plain: false,

@@ -22,6 +22,12 @@ pub fn pairs(bounce: u32) -> u32 {
     4 * (bounce + 1) + 3
 }
 
+/// Images of lamps at its vertex: choice of the image and direction (z, w).
+#[must_use]
+pub fn imaging(bounce: u32) -> u32 {
+    4 * (bounce + 1) + 3
+}
+
 /// Light sampling at its vertex: direction (x, y), choice of the light (z, w).
 #[must_use]
 pub fn lighting(bounce: u32) -> u32 {

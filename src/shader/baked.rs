@@ -8,6 +8,7 @@ use glam::DVec3;
 use super::bsdf::members;
 use crate::effects::{Effect, Effects};
 use crate::placement::cells::Chart;
+use crate::placement::images::LampImage;
 use crate::placement::{PlacedSphere, Placement, Side};
 use crate::records::layout::light_weight;
 use crate::records::material::MaterialRecord;
@@ -267,6 +268,33 @@ fn chart_of(text: &mut String, placement: &Placement) {
         );
     }
     *text += "return chart;\n}\n";
+}
+
+/// The module `lamp_images`: the images of lamps that vertices look for, whatever the form of the geometry.
+pub(super) fn images(placement: &Placement) -> String {
+    let images = placement.images.as_deref().unwrap_or_default();
+    let each = |value: &dyn Fn(&LampImage) -> String| images.iter().map(value).collect::<Vec<_>>();
+    let mut text = format!(
+        "import package::light::images::LampImage;\nconst LAMP_IMAGE_COUNT: u32 = {}u;\n\
+         fn image_of(index: u32) -> LampImage {{\nvar image: LampImage;\n",
+        images.len()
+    );
+    let word = |value: usize| format!("{value}u");
+    choose(&mut text, "image.sphere", &each(&|i| word(i.sphere)));
+    choose(&mut text, "image.way", &each(&|i| word(i.way as usize)));
+    choose(&mut text, "image.lamp", &each(&|i| word(i.lamp)));
+    choose(
+        &mut text,
+        "image.ior",
+        &each(&|i| number(i.ior.unwrap_or(0.0))),
+    );
+    choose(
+        &mut text,
+        "image.strength",
+        &each(&|i| number(i.strength * placement.radiance_scale)),
+    );
+    text += "return image;\n}\n";
+    text
 }
 
 /// What spheres count for as lights, and unless they are drawn from a table, their weighing.

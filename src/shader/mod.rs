@@ -227,6 +227,10 @@ fn link_from(
         let text = baked::attributes(scene, placement, effects);
         resolver.add_module(module_path("attributes"), text.into());
     }
+    if effects.has(Effect::LampImages) {
+        let text = baked::images(placement);
+        resolver.add_module(module_path("lamp_images"), text.into());
+    }
     let mut compiler = Wesl::new_barebones().set_custom_resolver(resolver);
     compiler
         .set_options(CompileOptions {

@@ -23,6 +23,7 @@ sources![
     "film/work",
     "light/aim",
     "light/direct",
+    "light/images",
     "light/light",
     "light/mis",
     "light/nee",

@@ -24,6 +24,9 @@ pub const LOOP_ITERATIONS: u64 = 65_000;
 /// Spheres that an iteration of the loop over spheres about their centres tests.
 const SPHERES_AN_ITERATION: usize = 8;
 
+/// Bins of an image's impact parameters, as in `shaders/light/images.wesl`.
+const BINS: usize = 4;
+
 /// One loop of the path tracer's kernel.
 #[derive(Debug)]
 pub struct Loop {
@@ -36,7 +39,7 @@ pub struct Loop {
 }
 
 /// All loops of the path tracer's kernel.
-pub const LOOPS: [Loop; 18] = [
+pub const LOOPS: [Loop; 22] = [
     // Over vertices.
     Loop {
         function: "render",
@@ -168,7 +171,39 @@ pub const LOOPS: [Loop; 18] = [
         used: |effects| effects.weighs_lights() && effects.keeps_spheres(),
         at_vertex: |placement, _| placement.lights.table.len().max(1) + 1,
     },
+    // Over images of lamps: one is chosen,
+    Loop {
+        function: "choose_image",
+        used: |effects| effects.has(Effect::LampImages),
+        at_vertex: |placement, _| images(placement) + 1,
+    },
+    // and the pdf of one asked for where a path comes to a lamp.
+    Loop {
+        function: "image_pdf",
+        used: |effects| effects.has(Effect::LampImages),
+        at_vertex: |placement, _| images(placement) + 1,
+    },
+    // Over bins of what is seen, for each of the two.
+    Loop {
+        function: "bins_of",
+        used: |effects| effects.has(Effect::LampImages),
+        at_vertex: |_, _| 2 * (BINS + 1),
+    },
+    // Over the surfaces on the way to one.
+    Loop {
+        function: "light_by",
+        used: |effects| effects.has(Effect::LampImages),
+        at_vertex: |_, _| IMAGE_RAYS + 1,
+    },
 ];
+
+/// Rays of the longest way to an image: to the sphere, through it, and to the lamp.
+const IMAGE_RAYS: usize = 3;
+
+/// Images of lamps that vertices look for.
+fn images(placement: &Placement) -> usize {
+    placement.images.as_ref().map_or(0, Vec::len)
+}
 
 /// Whether directions are drawn from one of a mix's parts: by the lecture's integrator only where it is a delta lobe.
 fn draws_from_parts(effects: &Effects) -> bool {
@@ -197,11 +232,12 @@ fn parts_visited(placement: &Placement, effects: &Effects) -> usize {
     }
 }
 
-/// Rays that are traced at a vertex: with light sampling also one to a light, and with the radiance cache the next one, and
-/// one to another point of a cell.
+/// Rays that are traced at a vertex: with light sampling also one to a light, and with images of lamps some to one; and
+/// with the radiance cache the next one, and one to another point of a cell.
 fn rays(effects: &Effects) -> usize {
     let cache = usize::from(effects.has(Effect::RadianceCache));
-    1 + usize::from(effects.samples_light()) + 2 * cache
+    let images = usize::from(effects.has(Effect::LampImages));
+    1 + usize::from(effects.samples_light()) + IMAGE_RAYS * images + 2 * cache
 }
 
 /// Most loop iterations that the kernel makes for one vertex of a path, but for those of loops that count themselves.

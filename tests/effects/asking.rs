@@ -142,6 +142,10 @@ pub(super) fn asking_for(set: &Set) -> (Scene, Settings) {
             sphere(0, 0.4 * i as f64 - 1.6, 4.0, 0.0, 0.1);
         }
     }
+    if has(Effect::LampImages) {
+        // Whatever the first one is, there is a lamp apart from a sphere that makes images.
+        sphere(0, 0.0, -3.0, 0.0, 0.5);
+    }
     let nudged = has(Effect::Nudge) || has(Effect::Ulp);
     if has(Effect::Straddle) && !nudged {
         // Through the lens, with something so small and far that this one gets no pole frame.
@@ -197,6 +201,7 @@ pub(super) fn asking_for(set: &Set) -> (Scene, Settings) {
             .then_some(LightSampling::Cone),
         roulette: (!has(Effect::Lecture)).then_some(has(Effect::Roulette)),
         radiance_cache: has(Effect::RadianceCache),
+        lamp_images: has(Effect::LampImages),
         adaptive: has(Effect::Adaptive),
         classes: has(Effect::Classes),
         features: has(Effect::Features),

@@ -31,6 +31,7 @@ const OPTIONS: &[&str] = &[
     "--sampler",
     "--max-bounces",
     "--radiance-cache",
+    "--lamp-images",
     "--roulette",
     "--termination",
     "--backend",

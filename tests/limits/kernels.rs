@@ -60,8 +60,12 @@ fn kernels_of(file: PathBuf) -> Vec<Linked> {
         radiance_cache: true,
         ..Settings::for_scene(&scene)
     };
+    let images = Settings {
+        lamp_images: true,
+        ..Settings::for_scene(&scene)
+    };
     let mut all = Vec::new();
-    for settings in [few, many, table, cache] {
+    for settings in [few, many, table, cache, images] {
         for geometry in [
             GeometryChoice::Auto,
             GeometryChoice::List,

@@ -34,6 +34,7 @@ fn statistics() -> Stats {
         sampler: "random".into(),
         max_bounces: 64,
         radiance_cache: false,
+        lamp_images: false,
         mean_stderr: None,
         roulette: true,
         seconds: stats::Seconds {
@@ -100,6 +101,7 @@ fn statistics_are_valid_json() {
         "version",
         "max_bounces",
         "radiance_cache",
+        "lamp_images",
         "mean_stderr",
         "roulette",
         "black",

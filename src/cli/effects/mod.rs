@@ -48,8 +48,8 @@ pub(super) struct EffectsArgs {
         long,
         requires = "measure",
         conflicts_with_all = [
-            "scene", "size", "integrator", "light_sampling", "sampler", "max_bounces", "radiance_cache", "roulette",
-            "termination", "offset", "geometry", "aov", "view", "adaptive", "spp", "error", "time",
+            "scene", "size", "integrator", "light_sampling", "sampler", "max_bounces", "radiance_cache", "lamp_images",
+            "roulette", "termination", "offset", "geometry", "aov", "view", "adaptive", "spp", "error", "time",
             "sample_range", "dump_wgsl",
         ],
         help_heading = "Prices"
@@ -95,6 +95,9 @@ pub(super) fn run(args: &EffectsArgs) -> Result<()> {
     let mut chosen = choice.as_ref().map(why_chosen).unwrap_or_default();
     if let Some(why) = job.cache_obstacle() {
         let _ = writeln!(chosen, "\n--radiance-cache is off: {why}");
+    }
+    if let Some(why) = job.image_obstacle() {
+        let _ = writeln!(chosen, "\n--lamp-images is off: {why}");
     }
     print(&(table(&loaded.name, effects, [lines, state as usize]) + &chosen))
 }

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use super::checkpoint::{self, Checkpoint};
 use super::display::{Display, Series};
 use super::statistics::statistics;
-use super::summary::{left_out, no_stderr, not_finite, observations, without_cache};
+use super::summary::{left_out, no_stderr, not_finite, observations, without_effect};
 use super::{Request, check_finite, failed, finish, write_file};
 use crate::backend::{Backend, BackendKind};
 use crate::cli::args::RenderArgs;
@@ -73,7 +73,7 @@ impl Session {
         let mut warnings: Vec<String> = request.loaded.warnings.iter().map(bare).collect();
         warnings.extend(job.variance().warning.clone());
         warnings.extend(left_out(job.placement()));
-        warnings.extend(without_cache(job));
+        warnings.extend(without_effect(job));
         warnings.extend_from_slice(&self.warnings);
         if let Some(path) = &args.dump_wgsl {
             let kernel = link(Stage::Path, job.scene(), job.placement(), job.effects())?;

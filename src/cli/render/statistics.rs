@@ -1,6 +1,7 @@
 //! The figures of a finished render.
 
 use crate::backend::BackendKind;
+use crate::effects::Effect;
 use crate::job::Job;
 use crate::output::Stats;
 use crate::output::stats::{BounceLimit, Device, Seconds};
@@ -41,6 +42,7 @@ pub(super) fn statistics(
         sampler: settings.sampler.name().into(),
         max_bounces: settings.max_bounces,
         radiance_cache: job.cells().is_some(),
+        lamp_images: job.effects().has(Effect::LampImages),
         roulette: settings.has_roulette(),
         seconds: Seconds::default(),
         samples,

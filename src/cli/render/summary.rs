@@ -105,10 +105,14 @@ pub(super) fn left_out(placement: &Placement) -> Option<String> {
     })
 }
 
-/// Why there is no radiance cache, where one is asked for.
-pub(super) fn without_cache(job: &Job) -> Option<String> {
-    let why = job.cache_obstacle()?;
-    Some(format!("--radiance-cache on is without effect: {why}"))
+/// Why there is no radiance cache, and why no images of lamps, where they are asked for.
+pub(super) fn without_effect(job: &Job) -> Vec<String> {
+    let asked = [
+        ("radiance-cache", job.cache_obstacle()),
+        ("lamp-images", job.image_obstacle()),
+    ];
+    let said = |(option, why)| Some(format!("--{option} on is without effect: {}", why?));
+    asked.into_iter().filter_map(said).collect()
 }
 
 /// What the user should know about the outcome.

@@ -55,6 +55,7 @@ impl Passed {
             sampler,
             max_bounces,
             radiance_cache,
+            lamp_images,
             roulette,
             termination,
             offset,
@@ -142,6 +143,10 @@ impl Passed {
             radiance_cache
                 .filter(|caching| *caching != Caching::Auto)
                 .map(|caching| caching.name().into()),
+        );
+        give(
+            "lamp-images",
+            lamp_images.map(|on| if on { "on" } else { "off" }.into()),
         );
         give(
             "roulette",
@@ -236,7 +241,7 @@ mod tests {
         for typed in [
             all,
             "--integrator lecture --termination 0.123456789012345678 --quiet",
-            "--integrator nee --backend cpu --roulette on --radiance-cache off",
+            "--integrator nee --backend cpu --roulette on --radiance-cache off --lamp-images on",
             "",
         ] {
             let args = parse(typed.split_whitespace());

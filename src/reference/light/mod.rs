@@ -2,6 +2,7 @@
 
 pub mod aim;
 pub mod environment;
+pub mod images;
 pub mod projected;
 pub mod skylight;
 pub mod sphere;

@@ -1,0 +1,116 @@
+//! Images of lamps that one smooth sphere makes: by reflection on a mirror or on glass, or through glass.
+//!
+//! Part of the placement: decided once, for both renderers.
+
+use super::lights::Lights;
+use super::sphere::{PlacedSphere, Side};
+use crate::materials::MaterialKind;
+use crate::materials::dielectric::fresnel;
+use crate::scene::Scene;
+
+/// Images up to which each is weighed at each vertex. A limit on the work there, not tuned.
+pub const MOST_IMAGES: usize = 16;
+
+/// How light goes by the sphere.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum Way {
+    /// Reflected on its outside.
+    Reflected = 0,
+    /// Refracted into it, and out of it.
+    Through = 1,
+}
+
+/// An image of a lamp.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LampImage {
+    /// The sphere that makes it, an index into the placement's.
+    pub sphere: usize,
+    /// How.
+    pub way: Way,
+    /// The lamp's sphere.
+    pub lamp: usize,
+    /// Refractive index of a sphere of glass; `None` for a mirror.
+    pub ior: Option<f64>,
+    /// What it counts for when one is chosen, but for where the vertex is: in the mean over all directions the
+    /// luminance times the solid angle that the image has at the distance of the sphere's radius.
+    pub strength: f64,
+}
+
+/// How far apart lamp and sphere are at least, as a share of the distance of their centres: beyond what rounding to f32
+/// does to either, so that all of the lamp is outside the sphere, and all of the sphere outside the lamp, for both
+/// renderers.
+const APART: f64 = 1.0e-5;
+
+/// Whether all that a material does is to reflect like a mirror, or to reflect and refract like smooth glass: the
+/// index of that.
+fn smooth(kind: &MaterialKind) -> Option<Option<f64>> {
+    match kind {
+        MaterialKind::Mirror(_) => Some(None),
+        MaterialKind::Dielectric(_) if kind.is_delta() => Some(Some(kind.ior())),
+        _ => None,
+    }
+}
+
+/// The share of parallel light on a sphere of this index that it reflects: by the midpoint rule over the square of the
+/// impact parameter.
+fn mean_reflected(ior: f64) -> f64 {
+    const STEPS: i32 = 64;
+    let middles = (0..STEPS).map(|i| (f64::from(i) + 0.5) / f64::from(STEPS));
+    let sum: f64 = middles
+        .map(|u| fresnel((1.0 - u).sqrt(), ior).reflected)
+        .sum();
+    sum / f64::from(STEPS)
+}
+
+/// All images of lamps that are sampled; `None` if there are more than [`MOST_IMAGES`].
+///
+/// Only spheres about their centres make any, or are seen in them, and only where they are apart.
+#[must_use]
+pub(super) fn of(
+    scene: &Scene,
+    spheres: &[PlacedSphere],
+    lights: &Lights,
+) -> Option<Vec<LampImage>> {
+    let small =
+        |s: &PlacedSphere| s.pole.is_none() && matches!(s.side, Side::Outside | Side::Tracked);
+    let makers = spheres.iter().enumerate().filter_map(|(i, sphere)| {
+        let kind = &scene.materials[sphere.material].kind;
+        Some((i, sphere, kind, smooth(kind).filter(|_| small(sphere))?))
+    });
+    let mut images = Vec::new();
+    for (index, sphere, kind, ior) in makers {
+        for light in &lights.table {
+            let lamp = &spheres[light.sphere];
+            let distance = lamp.anchor.distance(sphere.anchor);
+            let apart = (1.0 - APART) * distance > sphere.radius + lamp.radius;
+            if light.sphere == index || !small(lamp) || !apart {
+                continue;
+            }
+            let ways = match ior {
+                None => vec![(Way::Reflected, crate::materials::luminance(kind.color()))],
+                Some(ior) => {
+                    let share = mean_reflected(ior);
+                    vec![(Way::Reflected, share), (Way::Through, 1.0 - share)]
+                }
+            };
+            // Reflected evenly in all directions (for parallel light on a mirror it is just so): over 4 pi R^2 in the place
+            // of pi R^2. The lamp's solid angle is pi (r/distance)^2.
+            let sent =
+                light.luminance * (lamp.radius / distance).powi(2) * std::f64::consts::PI / 4.0;
+            for (way, share) in ways {
+                if images.len() == MOST_IMAGES {
+                    return None;
+                }
+                images.push(LampImage {
+                    sphere: index,
+                    way,
+                    lamp: light.sphere,
+                    ior,
+                    strength: sent * share,
+                });
+            }
+        }
+    }
+    Some(images)
+}
