@@ -151,8 +151,9 @@ fn sky() {
 
 #[test]
 fn textures() {
+    let reference = Reference::of("textures");
     holds_without(
-        "textures",
+        reference,
         "axis = [0.5, 1.0, 0.3]",
         "axis = [0.52, 1.0, 0.3]",
     );
