@@ -15,7 +15,7 @@ fn state(job: &Job, effects: &Effects) -> u32 {
 }
 
 /// In the table's order.
-const STATEFUL: [&str; 10] = [
+const STATEFUL: [&str; 11] = [
     "straddle",
     "nested",
     "classes",
@@ -25,6 +25,7 @@ const STATEFUL: [&str; 10] = [
     "priority",
     "absorption",
     "dispersion",
+    "lamp_images",
     "radiance_cache",
 ];
 
