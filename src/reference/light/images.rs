@@ -4,18 +4,24 @@
 //! impact parameter s, at the angle theta to the axis, sin theta = s/D, and with the angle of incidence alpha = asin s,
 //! leaves it with the same impact parameter, since reflection and refraction on a sphere keep it, in the direction
 //!
-//!     psi = pi + theta - 2 alpha                      reflected,
-//!     psi = theta - 2 alpha + 2 alpha',               through, sin alpha' = s/n,
+//! ```text
+//! psi = pi + theta - 2 alpha                      reflected,
+//! psi = theta - 2 alpha + 2 alpha',               through, sin alpha' = s/n,
+//! ```
 //!
 //! measured from the axis to the side of the ray. In the plane of axis and lamp, with the lamp's centre at `along`
 //! and `across`, it misses that by
 //!
-//!     h = across cos psi - along sin psi - s,
+//! ```text
+//! h = across cos psi - along sin psi - s,
+//! ```
 //!
 //! and comes next to it at the length t = along cos psi + across sin psi. Turned about the axis by phi out of that plane,
 //! with k = 1 - cos phi, it meets the lamp of radius r where
 //!
-//!     (r - h)(r + h) - 2 b k + c k^2 >= 0,   b = across (s cos psi + t sin psi),   c = (across sin psi)^2,
+//! ```text
+//! (r - h)(r + h) - 2 b k + c k^2 >= 0,   b = across (s cos psi + t sin psi),   c = (across sin psi)^2,
+//! ```
 //!
 //! if t > 0 there. These are arcs about phi = 0 and, with -across for across, about phi = pi. A direction is drawn by
 //! u = s^2, from bins whose weights come from what is seen at their ends, and phi uniformly on the arcs.
