@@ -58,7 +58,7 @@ fn all_that_documents_say_to_type_is_understood() {
         );
         all += count;
     }
-    assert!(all > 60, "{all}");
+    assert!(all > 50, "{all}");
 }
 
 /// Companion: options and values that there are not.

@@ -47,7 +47,7 @@ pub struct Sight {
     /// To there.
     pub distance: f64,
     /// Unit length, across the axis, to the lamp's side.
-    pub side: DVec3,
+    pub sideways: DVec3,
     /// The lamp's centre, from the sphere's.
     pub along: f64,
     pub across: f64,
@@ -139,14 +139,14 @@ impl Sight {
         let along = to_lamp.dot(axis);
         let beside = to_lamp - along * axis;
         let across = beside.length();
-        let side = match across > 0.0 {
+        let sideways = match across > 0.0 {
             true => beside / across,
             false => basis_around(axis).tangent,
         };
         Some(Self {
             axis,
             distance,
-            side,
+            sideways,
             along,
             across,
             radius: lamp.radius / sphere.radius,
@@ -274,7 +274,7 @@ impl Sight {
         };
         let sin_t = place.sqrt() / self.distance;
         let cos_t = ((1.0 - sin_t) * (1.0 + sin_t)).sqrt();
-        let across = phi.cos() * self.side + phi.sin() * self.axis.cross(self.side);
+        let across = phi.cos() * self.sideways + phi.sin() * self.axis.cross(self.sideways);
         Some(ImageSample {
             wi: (cos_t * self.axis + sin_t * across).normalize(),
             pdf: self.density(place, bins[chosen] / (total * size), width),

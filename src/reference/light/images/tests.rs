@@ -24,7 +24,7 @@ fn traced(sight: &Sight, direction: DVec3) -> Option<f64> {
         at -= 2.0 * at.dot(within) * within;
         way = refract(within, -at, 1.0 / ior)?;
     }
-    let lamp = sight.along * sight.axis + sight.across * sight.side - at;
+    let lamp = sight.along * sight.axis + sight.across * sight.sideways - at;
     let near = lamp.dot(way);
     let missed = (lamp - near * way).length() / sight.radius;
     Some(if near > 0.0 { missed } else { -missed })
@@ -47,7 +47,7 @@ fn sights(random: &mut Random, count: usize) -> Vec<Sight> {
         Sight {
             axis,
             distance: 1.0 + random.magnitude(-2.0, 1.5),
-            side: basis_around(axis).tangent,
+            sideways: basis_around(axis).tangent,
             along: rho * f64::cos(beta),
             across: rho * f64::sin(beta).abs(),
             radius,
@@ -61,7 +61,7 @@ fn sights(random: &mut Random, count: usize) -> Vec<Sight> {
 /// The direction with this square of its impact parameter, at this angle about the axis.
 fn direction(sight: &Sight, u: f64, phi: f64) -> DVec3 {
     let sine = u.sqrt() / sight.distance;
-    let across = phi.cos() * sight.side + phi.sin() * sight.axis.cross(sight.side);
+    let across = phi.cos() * sight.sideways + phi.sin() * sight.axis.cross(sight.sideways);
     (1.0 - sine * sine).sqrt() * sight.axis + sine * across
 }
 
@@ -172,8 +172,8 @@ fn p_value(sight: &Sight, scale: f64) -> f64 {
         let u = (1.0 - cosine * cosine) * sight.distance.powi(2);
         let way = s.wi - cosine * sight.axis;
         let phi = way
-            .dot(sight.axis.cross(sight.side))
-            .atan2(way.dot(sight.side))
+            .dot(sight.axis.cross(sight.sideways))
+            .atan2(way.dot(sight.sideways))
             + PI;
         let cell = |x: f64| ((x * SIDE as f64) as usize).min(SIDE - 1);
         counts[SIDE * cell(u) + cell(phi / (2.0 * PI))] += 1;
