@@ -34,7 +34,7 @@ const LONG_FORMS: &str = "GPU_TRACE_TEST_ALL";
 ///
 /// The files of `tests/` that one driver answers for all: those that open no GPU; those of files, options,
 /// processes and studies, to which a GPU is one like another; those of light transport.
-const ONCE: [&str; 39] = [
+const ONCE: [&str; 40] = [
     "albedo_variance",
     "car_paint",
     "choice",
@@ -58,6 +58,7 @@ const ONCE: [&str; 39] = [
     "hazards",
     "input",
     "job",
+    "lamp_images",
     "ledger",
     "library",
     "material_keys",
