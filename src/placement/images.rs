@@ -78,13 +78,17 @@ pub(super) fn of(
         let kind = &scene.materials[sphere.material].kind;
         Some((i, sphere, kind, smooth(kind).filter(|_| small(sphere))?))
     });
+    // Walls have none in any sphere.
+    let lamps: Vec<_> = (lights.table.iter())
+        .filter(|light| small(&spheres[light.sphere]))
+        .collect();
     let mut images = Vec::new();
     for (index, sphere, kind, ior) in makers {
-        for light in &lights.table {
+        for light in &lamps {
             let lamp = &spheres[light.sphere];
             let distance = lamp.anchor.distance(sphere.anchor);
             let apart = (1.0 - APART) * distance > sphere.radius + lamp.radius;
-            if light.sphere == index || !small(lamp) || !apart {
+            if light.sphere == index || !apart {
                 continue;
             }
             let ways = match ior {
