@@ -105,6 +105,11 @@ impl MixTable {
         self.parts.len()
     }
 
+    /// The material of each.
+    pub fn materials(&self) -> impl Iterator<Item = &MaterialRecord> {
+        self.parts.iter().map(|part| &part.material)
+    }
+
     /// How many of their weights are textures.
     #[must_use]
     pub fn weights(&self) -> &[[u32; 2]] {

@@ -223,12 +223,11 @@ fn material_of(text: &mut String, scene: &Scene, placement: &Placement, effects:
     let records: Vec<MaterialRecord> = spheres
         .map(|i| tables.of_sphere(i, scene, placement))
         .collect();
-    *text += "fn material_of(index: u32) -> Material {\nvar material: Material;\n";
-    for member in members(effects) {
-        let values: Vec<String> = records.iter().map(|r| r.literal(member)).collect();
-        choose(text, &format!("material.{}", member.name), &values);
+    material_in(text, "material_of", &records, effects);
+    if effects.has_mixes() {
+        let parts: Vec<MaterialRecord> = tables.mixes.materials().cloned().collect();
+        material_in(text, "material_of_part", &parts, effects);
     }
-    *text += "return material;\n}\n";
     if effects.transmits() {
         let levels: Vec<String> = placement
             .spheres
@@ -239,6 +238,20 @@ fn material_of(text: &mut String, scene: &Scene, placement: &Placement, effects:
         choose(text, "level", &levels);
         *text += "return level;\n}\n";
     }
+}
+
+/// The function `name` that finds one of `records`.
+fn material_in(text: &mut String, name: &str, records: &[MaterialRecord], effects: &Effects) {
+    // Writing to a String cannot fail.
+    let _ = writeln!(
+        text,
+        "fn {name}(index: u32) -> Material {{\nvar material: Material;"
+    );
+    for member in members(effects) {
+        let values: Vec<String> = records.iter().map(|r| r.literal(member)).collect();
+        choose(text, &format!("material.{}", member.name), &values);
+    }
+    *text += "return material;\n}\n";
 }
 
 /// The charts that the radiance cache's cells are of.

@@ -57,16 +57,17 @@ pub(super) fn with_textures(effects: &Effects) -> String {
         "fn with_textures(material: Material, point: TexturePoint) -> Material {\n\
          var own = material;\n",
     );
-    for key in effects.textured_keys() {
-        let number = texture_member(key).name;
+    let keys: Vec<&str> = effects.textured_keys().collect();
+    for key in &keys {
+        let _ = writeln!(text, "var of_{key} = vec3f(0.0);");
+    }
+    text += &looked_up(&keys);
+    if keys.contains(&EMISSION) {
+        let number = texture_member(EMISSION).name;
         let _ = writeln!(
             text,
-            "var of_{key} = vec3f(0.0);\n\
-             if own.{number} != 0u {{ of_{key} = texture_value(own.{number}, point); }}"
+            "if own.{number} != 0u {{ own.emission = of_{EMISSION}; }}"
         );
-        if key == EMISSION {
-            let _ = writeln!(text, "if own.{number} != 0u {{ own.emission = of_{key}; }}");
-        }
     }
     let mut cases = String::new();
     for (code, form) in effects.forms() {
@@ -79,6 +80,31 @@ pub(super) fn with_textures(effects: &Effects) -> String {
         let _ = writeln!(text, "switch material.kind {{\n{cases}default: {{}}\n}}");
     }
     text + "return own;\n}\n"
+}
+
+/// The values of the textures of `keys`. Several are looked up in a loop, so that a kernel has the lookup once: compilers
+/// put functions in wherever they are called, and take more than twice as long for twice as much.
+fn looked_up(keys: &[&str]) -> String {
+    let number = |key| texture_member(key).name;
+    if let [key] = keys {
+        let number = number(key);
+        return format!(
+            "if own.{number} != 0u {{ of_{key} = texture_value(own.{number}, point); }}\n"
+        );
+    }
+    let (mut numbers, mut values) = (String::new(), String::new());
+    for (n, key) in keys.iter().enumerate() {
+        let number = number(key);
+        let _ = writeln!(numbers, "case {n}u: {{ number = own.{number}; }}");
+        let _ = writeln!(values, "case {n}u: {{ of_{key} = value; }}");
+    }
+    format!(
+        "for (var n = 0u; n < {}u; n++) {{\nvar number = 0u;\n\
+         switch n {{\n{numbers}default: {{}}\n}}\n\
+         if number != 0u {{\nlet value = texture_value(number, point);\n\
+         switch n {{\n{values}default: {{}}\n}}\n}}\n}}\n",
+        keys.len()
+    )
 }
 
 /// What is done for a form of which these keys may be textures.
