@@ -8,7 +8,6 @@ use crate::effects::{Effect, Effects};
 use crate::error::{Error, Result};
 use crate::gpu::engine::{Pass, Recording};
 use crate::image::Picture;
-use crate::materials::Member;
 use crate::placement::Placement;
 use crate::placement::containment::MOST_CORES;
 use crate::records::layout::{
@@ -16,19 +15,23 @@ use crate::records::layout::{
 };
 use crate::records::material::anchored_spheres;
 use crate::records::measured::{MEASURED_WIDTH, MeasuredTables};
-use crate::records::tables::SceneTables;
+use crate::records::tables::{MATERIALS_WIDTH, SceneTables};
 use crate::records::textures::{IMAGE_WIDTH, TextureTable};
 use crate::scene::{Environment, Scene, Sky};
-use crate::shader::{Kernel, material_members};
+use crate::shader::{Kernel, material_record};
 
 /// Name of the buffer.
 pub(super) const SCENE: &str = "scene";
 /// Names of the textures.
 pub(super) const TREE: &str = "tree";
+pub(super) const MATERIALS: &str = "material_texels";
 pub(super) const SKY: &str = "sky";
 pub(super) const SKY_TABLE: &str = "sky_table";
 pub(super) const IMAGES: &str = "image_texels";
 pub(super) const MEASURED: &str = "measured_texels";
+
+/// Bytes of a texel of all of them.
+const TEXEL: usize = 16;
 
 /// Whether the device takes the scene's data, and `partials` bytes of partial sums.
 ///
@@ -84,6 +87,35 @@ pub(super) fn check_sky(limits: &wgpu::Limits, sky: &Sky) -> Result<()> {
     Ok(())
 }
 
+/// Whether the device takes a texture of `width` x `rows` texels, of which the `what` are.
+fn check_rows(limits: &wgpu::Limits, what: &str, width: u32, rows: u64) -> Result<()> {
+    let most = limits.max_texture_dimension_2d;
+    if rows > most.into() || width > most {
+        return Err(Error::DeviceLimit(format!(
+            "the {what} need {width} x {rows} texels, more than the device's limit of {most} a side; --backend cpu has \
+             no such limit"
+        )));
+    }
+    Ok(())
+}
+
+/// Whether the device takes the records of materials.
+///
+/// # Errors
+/// [`Error::DeviceLimit`] if there are too many.
+pub(super) fn check_materials(
+    limits: &wgpu::Limits,
+    scene: &Scene,
+    placement: &Placement,
+    effects: &Effects,
+) -> Result<()> {
+    let (_, size) = material_record(effects);
+    let records = SceneTables::new(scene, placement).records(scene, placement);
+    let texels = records.len() as u64 * u64::from(size) / TEXEL as u64;
+    let rows = texels.div_ceil(MATERIALS_WIDTH.into());
+    check_rows(limits, "materials", MATERIALS_WIDTH, rows)
+}
+
 /// Whether the device takes the images of textures.
 ///
 /// # Errors
@@ -93,17 +125,8 @@ pub(super) fn check_images(
     scene: &Scene,
     placement: &Placement,
 ) -> Result<()> {
-    let (rows, most) = (
-        TextureTable::new(scene, placement).rows(),
-        limits.max_texture_dimension_2d,
-    );
-    if rows > most.into() || IMAGE_WIDTH > most {
-        return Err(Error::DeviceLimit(format!(
-            "the images of textures need {IMAGE_WIDTH} x {rows} texels, more than the device's limit of {most} a \
-             side; --backend cpu has no such limit"
-        )));
-    }
-    Ok(())
+    let rows = TextureTable::new(scene, placement).rows();
+    check_rows(limits, "images of textures", IMAGE_WIDTH, rows)
 }
 
 /// Whether the device takes the tables of measured materials.
@@ -115,23 +138,15 @@ pub(super) fn check_tables(
     scene: &Scene,
     placement: &Placement,
 ) -> Result<()> {
-    let (rows, most) = (
-        MeasuredTables::new(scene, placement).rows(),
-        limits.max_texture_dimension_2d,
-    );
-    if rows > most.into() || MEASURED_WIDTH > most {
-        return Err(Error::DeviceLimit(format!(
-            "the tables of measured materials need {MEASURED_WIDTH} x {rows} texels, more than the device's limit of \
-             {most} a side; --backend cpu has no such limit"
-        )));
-    }
-    Ok(())
+    let rows = MeasuredTables::new(scene, placement).rows();
+    check_rows(limits, "tables of measured materials", MEASURED_WIDTH, rows)
 }
 
 /// What the device holds of a scene.
 #[derive(Debug)]
 pub(super) struct SceneBytes {
     data: Option<Vec<u8>>,
+    materials: Option<Vec<u8>>,
     tree: Option<Vec<u8>>,
     /// With its width.
     sky: Option<(Vec<u8>, u32)>,
@@ -155,6 +170,9 @@ impl SceneBytes {
         let tables = SceneTables::new(scene, placement);
         Self {
             data: scene_data(kernel, scene, placement, effects, &tables),
+            materials: effects
+                .keeps_spheres()
+                .then(|| materials(scene, placement, effects, &tables)),
             measured: effects
                 .has_tables()
                 .then(|| bytemuck::cast_slice(&tables.measured.texels()).to_vec()),
@@ -173,6 +191,10 @@ impl SceneBytes {
     pub(super) fn upload<'a>(&'a self, recording: &mut Recording<'a>, pass: &Pass) {
         if let Some(data) = self.data.as_ref().filter(|_| pass.binds(SCENE)) {
             recording.upload(SCENE, data);
+        }
+        let materials = self.materials.as_ref();
+        if let Some(materials) = materials.filter(|_| pass.binds(MATERIALS)) {
+            recording.upload_texels(MATERIALS, materials, MATERIALS_WIDTH);
         }
         if let Some(tree) = self.tree.as_ref().filter(|_| pass.binds(TREE)) {
             recording.upload_texels(TREE, tree, WIDTH);
@@ -239,10 +261,9 @@ fn scene_data(
             "spheres" => spheres(kernel, placement),
             "poles" => poles(kernel, placement),
             "attributes" => attributes(scene, placement, effects),
-            "materials" => materials(kernel, scene, placement, effects, tables),
             "patterns" => patterns(kernel, &tables.textures),
             "images" => bytemuck::cast_slice(tables.textures.images()).to_vec(),
-            "parts" => parts(kernel, effects, tables),
+            "parts" => parts(kernel, tables),
             "part_weights" => bytemuck::cast_slice(tables.mixes.weights()).to_vec(),
             "charts" => charts(placement),
             "lights" => lights(kernel, placement, effects),
@@ -316,35 +337,24 @@ fn charts(placement: &Placement) -> Vec<u8> {
     bytes_of(charts)
 }
 
-/// The members of the kernel's `Material`, where each is, and its size.
-fn material_layout(kernel: &Kernel, effects: &Effects) -> (Vec<(Member, u32)>, u32) {
-    let (offsets, size) = kernel.struct_members("Material").unwrap_or_default();
-    let members = std::iter::zip(material_members(effects), offsets);
-    let members = members.map(|(member, (_, offset))| (member, offset));
-    (members.collect(), size)
-}
-
+/// The texture `material_texels`.
 fn materials(
-    kernel: &Kernel,
     scene: &Scene,
     placement: &Placement,
     effects: &Effects,
     tables: &SceneTables,
 ) -> Vec<u8> {
-    let (members, size) = material_layout(kernel, effects);
-    let shared = (0..scene.materials.len()).map(|i| tables.of_material(i, scene, placement));
-    let anchored = anchored_spheres(scene, placement);
-    let anchored = anchored.map(|i| tables.of_sphere(i, scene, placement));
-    let records = shared.chain(anchored);
-    records
-        .flat_map(|record| record.bytes(&members, size))
-        .collect()
+    let (members, size) = material_record(effects);
+    let records = tables.records(scene, placement).into_iter();
+    let mut bytes: Vec<u8> = records.flat_map(|r| r.bytes(&members, size)).collect();
+    let row = MATERIALS_WIDTH as usize * TEXEL;
+    bytes.resize(bytes.len().next_multiple_of(row).max(row), 0);
+    bytes
 }
 
-fn parts(kernel: &Kernel, effects: &Effects, tables: &SceneTables) -> Vec<u8> {
-    let (members, size) = material_layout(kernel, effects);
+fn parts(kernel: &Kernel, tables: &SceneTables) -> Vec<u8> {
     let (own, whole) = kernel.struct_members("MixPart").unwrap_or_default();
-    tables.mixes.bytes((&own, whole), (&members, size))
+    tables.mixes.bytes(&own, whole)
 }
 
 fn patterns(kernel: &Kernel, textures: &TextureTable) -> Vec<u8> {

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use crate::materials::Material;
 use crate::materials::measured::START;
-use crate::materials::{Material, Member};
 use crate::placement::{PlacedSphere, Placement};
 use crate::records::material::{MaterialRecord, anchored_spheres};
 use crate::records::measured::MeasuredTables;
@@ -116,27 +116,21 @@ impl MixTable {
         &self.weights
     }
 
-    /// The bytes of all parts: `own` are the members of the kernel's `MixPart` with their places, and `members` those of
-    /// its `Material`, each with that struct's size.
+    /// The bytes of all parts: `own` are the members of the kernel's `MixPart` with their places, and `whole` its size.
     #[must_use]
-    pub fn bytes(
-        &self,
-        (own, whole): (&[(String, u32)], u32),
-        (members, size): (&[(Member, u32)], u32),
-    ) -> Vec<u8> {
+    pub fn bytes(&self, own: &[(String, u32)], whole: u32) -> Vec<u8> {
         let mut bytes = Vec::with_capacity(self.parts.len() * whole as usize);
         for part in &self.parts {
             let mut record = vec![0; whole as usize];
             for (name, offset) in own {
                 let value = match name.as_str() {
-                    "material" => part.material.bytes(members, size),
-                    "weight" => part.weight.to_ne_bytes().into(),
-                    "second" => part.second.to_ne_bytes().into(),
-                    "first" => part.weights[0].to_ne_bytes().into(),
-                    "end" => part.weights[1].to_ne_bytes().into(),
+                    "weight" => part.weight.to_bits(),
+                    "second" => part.second,
+                    "first" => part.weights[0],
+                    "end" => part.weights[1],
                     other => unreachable!("a part has no {other}"),
                 };
-                record[*offset as usize..][..value.len()].copy_from_slice(&value);
+                record[*offset as usize..][..4].copy_from_slice(&value.to_ne_bytes());
             }
             bytes.extend(record);
         }

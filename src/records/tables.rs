@@ -4,11 +4,14 @@ use crate::materials::Material;
 use crate::materials::measured::START;
 use crate::materials::mix::PARTS;
 use crate::placement::Placement;
-use crate::records::material::{MaterialRecord, Numbers};
+use crate::records::material::{MaterialRecord, Numbers, anchored_spheres};
 use crate::records::measured::MeasuredTables;
 use crate::records::mix::MixTable;
 use crate::records::textures::TextureTable;
 use crate::scene::Scene;
+
+/// Columns of the texture `material_texels` of `shaders/scene/data.wesl`.
+pub const MATERIALS_WIDTH: u32 = 1024;
 
 /// Textures, tables of measured materials and parts of mixes.
 #[derive(Clone, Debug)]
@@ -47,6 +50,17 @@ impl SceneTables {
         let record = MaterialRecord::new(material, placement.radiance_scale, placement.scale);
         let numbers = self.textures.of_material(index);
         self.complete(record, material, numbers, self.mixes.of_material(index))
+    }
+
+    /// The records that a kernel with spheres in buffers reads: of the scene's materials, of spheres with one of their
+    /// own, and of the parts of mixes, in this order.
+    #[must_use]
+    pub fn records(&self, scene: &Scene, placement: &Placement) -> Vec<MaterialRecord> {
+        let shared = (0..scene.materials.len()).map(|i| self.of_material(i, scene, placement));
+        let anchored = anchored_spheres(scene, placement);
+        let anchored = anchored.map(|i| self.of_sphere(i, scene, placement));
+        let parts = self.mixes.materials().cloned();
+        shared.chain(anchored).chain(parts).collect()
     }
 
     /// The record of the material of a sphere of the placement.

@@ -55,6 +55,51 @@ pub fn members(effects: &Effects) -> Vec<Member> {
     members
 }
 
+/// Bytes of a texel of the texture of materials.
+const TEXEL: u32 = 16;
+
+/// Where each of the [`members`] is in a record of the texture `material_texels` of `shaders/scene/data.wesl`, in bytes,
+/// and the bytes of a record, which are whole texels: a vector begins one, and what follows it fits behind.
+#[must_use]
+pub fn record_of(effects: &Effects) -> (Vec<(Member, u32)>, u32) {
+    let mut end: u32 = 0;
+    let mut placed = Vec::new();
+    for member in members(effects) {
+        let (align, size) = match member.kind {
+            MemberKind::Vector => (TEXEL, 12),
+            MemberKind::Scalar | MemberKind::Word => (4, 4),
+        };
+        let offset = end.next_multiple_of(align);
+        placed.push((member, offset));
+        end = offset + size;
+    }
+    (placed, end.next_multiple_of(TEXEL))
+}
+
+/// The function that reads a record.
+fn material_in(effects: &Effects) -> String {
+    let (members, size) = record_of(effects);
+    let texels = size / TEXEL;
+    let mut text = format!(
+        "fn material_in(record: u32) -> Material {{\nvar own: Material;\nlet first = {texels}u * record;\n"
+    );
+    for (member, offset) in members {
+        let (texel, within) = (offset / TEXEL, (offset % TEXEL) as usize / 4);
+        // Writing to a String cannot fail.
+        if within == 0 {
+            let _ = writeln!(text, "let t{texel} = material_texel(first + {texel}u);");
+        }
+        let component = &"xyzw"[within..=within];
+        let value = match member.kind {
+            MemberKind::Vector => format!("bitcast<vec3f>(t{texel}.xyz)"),
+            MemberKind::Scalar => format!("bitcast<f32>(t{texel}.{component})"),
+            MemberKind::Word => format!("t{texel}.{component}"),
+        };
+        let _ = writeln!(text, "own.{} = {value};", member.name);
+    }
+    text + "return own;\n}\n"
+}
+
 /// The module's text.
 pub(super) fn module(effects: &Effects) -> String {
     let forms: Vec<(u32, &Form)> = effects.forms().collect();
@@ -103,6 +148,9 @@ pub(super) fn module(effects: &Effects) -> String {
     if effects.has_textures() {
         text += &textures::imports(effects);
     }
+    if effects.keeps_spheres() {
+        text += "import package::scene::data::material_texel;\n";
+    }
     text += "struct Material {\n";
     for member in members(effects) {
         let ty = match member.kind {
@@ -113,6 +161,9 @@ pub(super) fn module(effects: &Effects) -> String {
         let _ = writeln!(text, "{}: {ty},", member.name);
     }
     text += "}\n";
+    if effects.keeps_spheres() {
+        text += &material_in(effects);
+    }
     let plain = || forms.iter().filter(|(_, form)| !mix::is_mix(form));
     let samples: Vec<(u32, String)> = plain()
         .map(|(code, form)| (*code, sampled(form, lecture)))

@@ -13,7 +13,7 @@ pub mod steps;
 mod textures;
 mod without;
 
-pub use bsdf::members as material_members;
+pub use bsdf::{members as material_members, record_of as material_record};
 pub use names::declared_names;
 
 use glam::DVec3;
@@ -27,7 +27,7 @@ use crate::placement::{Medium, Placement};
 use crate::records::layout::{CELLS_WIDTH, SKY_TABLE_WIDTH};
 use crate::records::material::anchored_spheres;
 use crate::records::measured::MEASURED_WIDTH;
-use crate::records::tables::SceneTables;
+use crate::records::tables::{MATERIALS_WIDTH, SceneTables};
 use crate::records::textures::{IMAGE_WIDTH, TextureTable};
 use crate::scene::{Environment, Scene};
 
@@ -303,7 +303,10 @@ fn config(scene: &Scene, placement: &Placement, effects: &Effects) -> String {
     if effects.keeps_spheres() {
         text += &format!("const SPHERE_COUNT: u32 = {}u;\n", placement.spheres.len());
         let records = scene.materials.len() + anchored_spheres(scene, placement).count();
-        text += &format!("const MATERIAL_COUNT: u32 = {records}u;\n");
+        text += &format!("const MATERIALS_WIDTH: u32 = {MATERIALS_WIDTH}u;\n");
+        if effects.has_mixes() {
+            text += &format!("const FIRST_PART: u32 = {records}u;\n");
+        }
         if effects.has(Effect::Pole) {
             text += &format!("const POLE_COUNT: u32 = {}u;\n", placement.poles);
         }
