@@ -18,13 +18,16 @@ pub(super) fn rows() -> Vec<Row> {
     vec![
         form(Effect::Baked, "baked", "spheres as constants in the kernel")
             .excludes([Effect::List, Effect::Bvh]),
-        form(
-            Effect::List,
-            "list",
-            "a loop over spheres in a storage buffer",
-        )
-        .excludes([Effect::Bvh])
-        .marks(["FIRST_CENTERED", "spheres", "nearer_sphere"]),
+        form(Effect::List, "list", "a loop over spheres in a texture")
+            .excludes([Effect::Bvh])
+            .marks([
+                "FIRST_CENTERED",
+                "sphere_texels",
+                "SPHERE_TEXELS",
+                "SPHERES_WIDTH",
+                "sphere_of",
+                "nearer_sphere",
+            ]),
         form(Effect::Bvh, "bvh", "a tree over spheres in a texture").marks([
             "tree",
             "data::texel",

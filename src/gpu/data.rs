@@ -11,7 +11,8 @@ use crate::image::Picture;
 use crate::placement::Placement;
 use crate::placement::containment::MOST_CORES;
 use crate::records::layout::{
-    ChartRecord, LightRecord, PoleRecord, SKY_TABLE_WIDTH, SphereRecord, light_weight, sky_table,
+    ChartRecord, LightRecord, PoleRecord, SKY_TABLE_WIDTH, SPHERES_WIDTH, SphereRecord,
+    light_weight, sky_table,
 };
 use crate::records::material::anchored_spheres;
 use crate::records::measured::{MEASURED_WIDTH, MeasuredTables};
@@ -24,6 +25,7 @@ use crate::shader::{Kernel, material_record};
 pub(super) const SCENE: &str = "scene";
 /// Names of the textures.
 pub(super) const TREE: &str = "tree";
+pub(super) const SPHERES: &str = "sphere_texels";
 pub(super) const MATERIALS: &str = "material_texels";
 pub(super) const SKY: &str = "sky";
 pub(super) const SKY_TABLE: &str = "sky_table";
@@ -99,6 +101,20 @@ fn check_rows(limits: &wgpu::Limits, what: &str, width: u32, rows: u64) -> Resul
     Ok(())
 }
 
+/// Whether the device takes the spheres of a loop over all.
+///
+/// # Errors
+/// [`Error::DeviceLimit`] if there are too many.
+pub(super) fn check_spheres(
+    limits: &wgpu::Limits,
+    placement: &Placement,
+    effects: &Effects,
+) -> Result<()> {
+    let texels = placement.spheres.len() * sphere_texels(effects);
+    let rows = (texels as u64).div_ceil(SPHERES_WIDTH.into());
+    check_rows(limits, "spheres", SPHERES_WIDTH, rows)
+}
+
 /// Whether the device takes the records of materials.
 ///
 /// # Errors
@@ -147,6 +163,7 @@ pub(super) fn check_tables(
 pub(super) struct SceneBytes {
     data: Option<Vec<u8>>,
     materials: Option<Vec<u8>>,
+    spheres: Option<Vec<u8>>,
     tree: Option<Vec<u8>>,
     /// With its width.
     sky: Option<(Vec<u8>, u32)>,
@@ -173,6 +190,9 @@ impl SceneBytes {
             materials: effects
                 .keeps_spheres()
                 .then(|| materials(scene, placement, effects, &tables)),
+            spheres: effects
+                .has(Effect::List)
+                .then(|| spheres(placement, effects)),
             measured: effects
                 .has_tables()
                 .then(|| bytemuck::cast_slice(&tables.measured.texels()).to_vec()),
@@ -195,6 +215,10 @@ impl SceneBytes {
         let materials = self.materials.as_ref();
         if let Some(materials) = materials.filter(|_| pass.binds(MATERIALS)) {
             recording.upload_texels(MATERIALS, materials, MATERIALS_WIDTH);
+        }
+        let spheres = self.spheres.as_ref();
+        if let Some(spheres) = spheres.filter(|_| pass.binds(SPHERES)) {
+            recording.upload_texels(SPHERES, spheres, SPHERES_WIDTH);
         }
         if let Some(tree) = self.tree.as_ref().filter(|_| pass.binds(TREE)) {
             recording.upload_texels(TREE, tree, WIDTH);
@@ -258,7 +282,6 @@ fn scene_data(
     let ends = members.iter().skip(1).map(|(_, offset)| *offset);
     for ((name, offset), end) in members.iter().zip(ends.chain([size])) {
         let array = match name.as_str() {
-            "spheres" => spheres(kernel, placement),
             "poles" => poles(kernel, placement),
             "attributes" => attributes(scene, placement, effects),
             "patterns" => patterns(kernel, &tables.textures),
@@ -289,9 +312,25 @@ fn starts_of<T: Pod>(kernel: &Kernel, name: &str, records: impl Iterator<Item = 
     bytes
 }
 
-fn spheres(kernel: &Kernel, placement: &Placement) -> Vec<u8> {
+/// The texture `sphere_texels`.
+fn spheres(placement: &Placement, effects: &Effects) -> Vec<u8> {
+    let texels = sphere_texels(effects);
     let centered = placement.spheres[placement.poles..].iter();
-    starts_of(kernel, "Sphere", centered.map(SphereRecord::new))
+    let records = centered.map(SphereRecord::new);
+    let bytes = records.flat_map(|r| bytemuck::bytes_of(&r)[..texels * TEXEL].to_vec());
+    in_rows(bytes.collect(), SPHERES_WIDTH)
+}
+
+/// Texels of a sphere there: its way while the shutter is open is the second.
+fn sphere_texels(effects: &Effects) -> usize {
+    1 + usize::from(effects.has(Effect::Motion))
+}
+
+/// With zeros up to whole rows of texels, at least one.
+fn in_rows(mut bytes: Vec<u8>, width: u32) -> Vec<u8> {
+    let row = width as usize * TEXEL;
+    bytes.resize(bytes.len().next_multiple_of(row).max(row), 0);
+    bytes
 }
 
 fn poles(kernel: &Kernel, placement: &Placement) -> Vec<u8> {
@@ -346,10 +385,8 @@ fn materials(
 ) -> Vec<u8> {
     let (members, size) = material_record(effects);
     let records = tables.records(scene, placement).into_iter();
-    let mut bytes: Vec<u8> = records.flat_map(|r| r.bytes(&members, size)).collect();
-    let row = MATERIALS_WIDTH as usize * TEXEL;
-    bytes.resize(bytes.len().next_multiple_of(row).max(row), 0);
-    bytes
+    let bytes = records.flat_map(|r| r.bytes(&members, size)).collect();
+    in_rows(bytes, MATERIALS_WIDTH)
 }
 
 fn parts(kernel: &Kernel, tables: &SceneTables) -> Vec<u8> {

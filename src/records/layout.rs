@@ -153,6 +153,9 @@ impl LightRecord {
 /// Columns of the texture `sky_table` of `shaders/light/skylight.wesl`.
 pub const SKY_TABLE_WIDTH: u32 = 4096;
 
+/// Columns of the texture `sphere_texels` of `shaders/scene/data.wesl`.
+pub const SPHERES_WIDTH: u32 = 1024;
+
 /// The texels of that texture, whole rows of them.
 #[must_use]
 pub fn sky_table(table: &SkyTable) -> Vec<[u32; 4]> {

@@ -24,7 +24,7 @@ use crate::effects::{Effect, Effects, Role};
 use crate::error::{Error, Result};
 use crate::materials;
 use crate::placement::{Medium, Placement};
-use crate::records::layout::{CELLS_WIDTH, SKY_TABLE_WIDTH};
+use crate::records::layout::{CELLS_WIDTH, SKY_TABLE_WIDTH, SPHERES_WIDTH};
 use crate::records::material::anchored_spheres;
 use crate::records::measured::MEASURED_WIDTH;
 use crate::records::tables::{MATERIALS_WIDTH, SceneTables};
@@ -310,6 +310,9 @@ fn config(scene: &Scene, placement: &Placement, effects: &Effects) -> String {
         if effects.has(Effect::Pole) {
             text += &format!("const POLE_COUNT: u32 = {}u;\n", placement.poles);
         }
+    }
+    if effects.has(Effect::List) {
+        text += &format!("const SPHERES_WIDTH: u32 = {SPHERES_WIDTH}u;\n");
     }
     if effects.has(Effect::RadianceCache) {
         let cells = placement.cells().map_or(0, |cells| cells.count());
