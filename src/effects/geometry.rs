@@ -71,7 +71,6 @@ pub(super) fn rows() -> Vec<Row> {
             "Light::curvature",
             "Pattern::place",
             "Pattern::cell",
-            "Pattern::unused",
             "on_sphere",
         ]),
         Row::new(

@@ -27,8 +27,10 @@ pub(super) fn rows() -> Vec<Row> {
                 .marks([
                     "mix",
                     "data::MixPart",
-                    "SceneData::parts",
-                    "PART_COUNT",
+                    "part_of",
+                    "material_of_part",
+                    "FIRST_PART",
+                    "PART_MATERIALS",
                     "share_of",
                     "sample_part",
                     "evaluate_part",

@@ -50,8 +50,8 @@ pub(super) fn rows() -> Vec<Row> {
             "image_texel",
             "image_texels",
             "data::Image",
-            "SceneData::images",
-            "IMAGE_COUNT",
+            "image_of",
+            "FIRST_IMAGE",
             "IMAGE_WIDTH",
         ]),
     ];
@@ -80,11 +80,7 @@ pub(super) fn rows() -> Vec<Row> {
             name => {
                 let row = row.needs(forms_that(|form| form.texturable().any(|t| t.key == name)));
                 match name {
-                    WEIGHT => row.marks([
-                        "data::PartWeight",
-                        "SceneData::part_weights",
-                        "PART_WEIGHT_COUNT",
-                    ]),
+                    WEIGHT => row.marks(["data::PartWeight", "part_weight_of", "FIRST_WEIGHT"]),
                     _ => row,
                 }
             }

@@ -16,7 +16,7 @@ use crate::records::layout::{
 };
 use crate::records::material::anchored_spheres;
 use crate::records::measured::{MEASURED_WIDTH, MeasuredTables};
-use crate::records::tables::{MATERIALS_WIDTH, SceneTables};
+use crate::records::tables::{MATERIALS_WIDTH, RECORDS_WIDTH, SceneTables};
 use crate::records::textures::{IMAGE_WIDTH, TextureTable};
 use crate::scene::{Environment, Scene, Sky};
 use crate::shader::{Kernel, material_record};
@@ -25,6 +25,7 @@ use crate::shader::{Kernel, material_record};
 pub(super) const SCENE: &str = "scene";
 /// Names of the textures.
 pub(super) const TREE: &str = "tree";
+pub(super) const RECORDS: &str = "record_texels";
 pub(super) const SPHERES: &str = "sphere_texels";
 pub(super) const MATERIALS: &str = "material_texels";
 pub(super) const SKY: &str = "sky";
@@ -132,6 +133,21 @@ pub(super) fn check_materials(
     check_rows(limits, "materials", MATERIALS_WIDTH, rows)
 }
 
+/// Whether the device takes the records of textures and of mixes.
+///
+/// # Errors
+/// [`Error::DeviceLimit`] if there are too many.
+pub(super) fn check_records(
+    limits: &wgpu::Limits,
+    scene: &Scene,
+    placement: &Placement,
+    effects: &Effects,
+) -> Result<()> {
+    let texels = SceneTables::new(scene, placement).texels(effects).len() as u64;
+    let rows = texels.div_ceil(RECORDS_WIDTH.into());
+    check_rows(limits, "textures and mixes", RECORDS_WIDTH, rows)
+}
+
 /// Whether the device takes the images of textures.
 ///
 /// # Errors
@@ -164,6 +180,7 @@ pub(super) struct SceneBytes {
     data: Option<Vec<u8>>,
     materials: Option<Vec<u8>>,
     spheres: Option<Vec<u8>>,
+    records: Option<Vec<u8>>,
     tree: Option<Vec<u8>>,
     /// With its width.
     sky: Option<(Vec<u8>, u32)>,
@@ -186,7 +203,11 @@ impl SceneBytes {
         };
         let tables = SceneTables::new(scene, placement);
         Self {
-            data: scene_data(kernel, scene, placement, effects, &tables),
+            data: scene_data(kernel, scene, placement, effects),
+            records: (effects.has_textures() || effects.has_mixes()).then(|| {
+                let texels = bytemuck::cast_slice(&tables.texels(effects)).to_vec();
+                in_rows(texels, RECORDS_WIDTH)
+            }),
             materials: effects
                 .keeps_spheres()
                 .then(|| materials(scene, placement, effects, &tables)),
@@ -219,6 +240,10 @@ impl SceneBytes {
         let spheres = self.spheres.as_ref();
         if let Some(spheres) = spheres.filter(|_| pass.binds(SPHERES)) {
             recording.upload_texels(SPHERES, spheres, SPHERES_WIDTH);
+        }
+        let records = self.records.as_ref();
+        if let Some(records) = records.filter(|_| pass.binds(RECORDS)) {
+            recording.upload_texels(RECORDS, records, RECORDS_WIDTH);
         }
         if let Some(tree) = self.tree.as_ref().filter(|_| pass.binds(TREE)) {
             recording.upload_texels(TREE, tree, WIDTH);
@@ -275,7 +300,6 @@ fn scene_data(
     scene: &Scene,
     placement: &Placement,
     effects: &Effects,
-    tables: &SceneTables,
 ) -> Option<Vec<u8>> {
     let (members, size) = kernel.struct_members("SceneData")?;
     let mut bytes = vec![0; size as usize];
@@ -284,10 +308,6 @@ fn scene_data(
         let array = match name.as_str() {
             "poles" => poles(kernel, placement),
             "attributes" => attributes(scene, placement, effects),
-            "patterns" => patterns(kernel, &tables.textures),
-            "images" => bytemuck::cast_slice(tables.textures.images()).to_vec(),
-            "parts" => parts(kernel, tables),
-            "part_weights" => bytemuck::cast_slice(tables.mixes.weights()).to_vec(),
             "charts" => charts(placement),
             "lights" => lights(kernel, placement, effects),
             other => unreachable!("no scene data {other}"),
@@ -387,15 +407,6 @@ fn materials(
     let records = tables.records(scene, placement).into_iter();
     let bytes = records.flat_map(|r| r.bytes(&members, size)).collect();
     in_rows(bytes, MATERIALS_WIDTH)
-}
-
-fn parts(kernel: &Kernel, tables: &SceneTables) -> Vec<u8> {
-    let (own, whole) = kernel.struct_members("MixPart").unwrap_or_default();
-    tables.mixes.bytes(&own, whole)
-}
-
-fn patterns(kernel: &Kernel, textures: &TextureTable) -> Vec<u8> {
-    starts_of(kernel, "Pattern", textures.patterns().iter().copied())
 }
 
 fn lights(kernel: &Kernel, placement: &Placement, effects: &Effects) -> Vec<u8> {

@@ -107,6 +107,9 @@ impl GpuRenderer {
         if let Some(sky) = data::sky_of(scene, effects) {
             data::check_sky(&gpu.limits, sky)?;
         }
+        if effects.has_textures() || effects.has_mixes() {
+            data::check_records(&gpu.limits, scene, placement, effects)?;
+        }
         if effects.has(Effect::TextureImage) {
             data::check_images(&gpu.limits, scene, placement)?;
         }

@@ -116,24 +116,12 @@ impl MixTable {
         &self.weights
     }
 
-    /// The bytes of all parts: `own` are the members of the kernel's `MixPart` with their places, and `whole` its size.
-    #[must_use]
-    pub fn bytes(&self, own: &[(String, u32)], whole: u32) -> Vec<u8> {
-        let mut bytes = Vec::with_capacity(self.parts.len() * whole as usize);
-        for part in &self.parts {
-            let mut record = vec![0; whole as usize];
-            for (name, offset) in own {
-                let value = match name.as_str() {
-                    "weight" => part.weight.to_bits(),
-                    "second" => part.second,
-                    "first" => part.weights[0],
-                    "end" => part.weights[1],
-                    other => unreachable!("a part has no {other}"),
-                };
-                record[*offset as usize..][..4].copy_from_slice(&value.to_ne_bytes());
-            }
-            bytes.extend(record);
-        }
-        bytes
+    /// All parts as `MixPart`: its weight, of which of the two it is, and where its weights begin and end.
+    pub fn part_texels(&self) -> impl Iterator<Item = [u32; 4]> {
+        let parts = self.parts.iter();
+        parts.map(|part| {
+            let [first, end] = part.weights;
+            [part.weight.to_bits(), part.second, first, end]
+        })
     }
 }

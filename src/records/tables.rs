@@ -1,5 +1,6 @@
 //! All that a kernel's records of materials refer to by numbers.
 
+use crate::effects::{Effect, Effects};
 use crate::materials::Material;
 use crate::materials::measured::START;
 use crate::materials::mix::PARTS;
@@ -7,11 +8,17 @@ use crate::placement::Placement;
 use crate::records::material::{MaterialRecord, Numbers, anchored_spheres};
 use crate::records::measured::MeasuredTables;
 use crate::records::mix::MixTable;
-use crate::records::textures::TextureTable;
+use crate::records::textures::{ImageRecord, TextureTable};
 use crate::scene::Scene;
 
 /// Columns of the texture `material_texels` of `shaders/scene/data.wesl`.
 pub const MATERIALS_WIDTH: u32 = 1024;
+
+/// Columns of the texture `record_texels` there.
+pub const RECORDS_WIDTH: u32 = 1024;
+
+/// A texel of it.
+type Texel = [u32; 4];
 
 /// Textures, tables of measured materials and parts of mixes.
 #[derive(Clone, Debug)]
@@ -36,6 +43,31 @@ impl SceneTables {
             measured,
             mixes,
         }
+    }
+
+    /// The texture `record_texels` but for the zeros that fill its last row: patterns, images, parts of mixes, and their
+    /// weights.
+    #[must_use]
+    pub fn texels(&self, effects: &Effects) -> Vec<Texel> {
+        let mut texels = Vec::new();
+        for pattern in self.textures.patterns() {
+            let whole: &[Texel] = bytemuck::cast_slice(std::slice::from_ref(pattern));
+            texels.extend(&whole[..pattern_texels(effects)]);
+        }
+        texels.extend::<&[Texel]>(bytemuck::cast_slice(self.textures.images()));
+        texels.extend(self.mixes.part_texels());
+        let weights = self.mixes.weights().iter();
+        texels.extend(weights.map(|&[number, second]| [number, second, 0, 0]));
+        texels
+    }
+
+    /// Its texels at which images, parts and weights begin.
+    #[must_use]
+    pub fn firsts(&self, effects: &Effects) -> [usize; 3] {
+        let image = pattern_texels(effects) * self.textures.patterns().len();
+        let part =
+            image + size_of::<ImageRecord>() / size_of::<Texel>() * self.textures.images().len();
+        [image, part, part + self.mixes.parts()]
     }
 
     /// The record of a material of the scene, for spheres about their centres.
@@ -91,4 +123,9 @@ impl SceneTables {
             .with_word(PARTS[1], end)
             .with_textures(material, numbers)
     }
+}
+
+/// Texels of a pattern: what is for pole frames ends the record.
+fn pattern_texels(effects: &Effects) -> usize {
+    if effects.has(Effect::Pole) { 4 } else { 2 }
 }

@@ -27,8 +27,8 @@ use crate::placement::{Medium, Placement};
 use crate::records::layout::{CELLS_WIDTH, SKY_TABLE_WIDTH, SPHERES_WIDTH};
 use crate::records::material::anchored_spheres;
 use crate::records::measured::MEASURED_WIDTH;
-use crate::records::tables::{MATERIALS_WIDTH, SceneTables};
-use crate::records::textures::{IMAGE_WIDTH, TextureTable};
+use crate::records::tables::{MATERIALS_WIDTH, RECORDS_WIDTH, SceneTables};
+use crate::records::textures::IMAGE_WIDTH;
 use crate::scene::{Environment, Scene};
 
 pub use binding::Binding;
@@ -305,7 +305,7 @@ fn config(scene: &Scene, placement: &Placement, effects: &Effects) -> String {
         let records = scene.materials.len() + anchored_spheres(scene, placement).count();
         text += &format!("const MATERIALS_WIDTH: u32 = {MATERIALS_WIDTH}u;\n");
         if effects.has_mixes() {
-            text += &format!("const FIRST_PART: u32 = {records}u;\n");
+            text += &format!("const PART_MATERIALS: u32 = {records}u;\n");
         }
         if effects.has(Effect::Pole) {
             text += &format!("const POLE_COUNT: u32 = {}u;\n", placement.poles);
@@ -339,20 +339,13 @@ fn config(scene: &Scene, placement: &Placement, effects: &Effects) -> String {
         text += &format!("const SCENE_UNIT: f32 = {unit};\n");
     }
     if effects.has_textures() {
-        let table = TextureTable::new(scene, placement);
-        text += &format!(
-            "const PATTERN_COUNT: u32 = {}u;\nconst IMAGE_COUNT: u32 = {}u;\n\
-             const IMAGE_WIDTH: u32 = {IMAGE_WIDTH}u;\n",
-            table.patterns().len().max(1),
-            table.images().len().max(1)
-        );
+        text += &format!("const IMAGE_WIDTH: u32 = {IMAGE_WIDTH}u;\n");
     }
-    if effects.has_mixes() {
-        let mixes = SceneTables::new(scene, placement).mixes;
+    if effects.has_textures() || effects.has_mixes() {
+        let [image, part, weight] = SceneTables::new(scene, placement).firsts(effects);
         text += &format!(
-            "const PART_COUNT: u32 = {}u;\nconst PART_WEIGHT_COUNT: u32 = {}u;\n",
-            mixes.parts().max(1),
-            mixes.weights().len().max(1)
+            "const RECORDS_WIDTH: u32 = {RECORDS_WIDTH}u;\nconst FIRST_IMAGE: u32 = {image}u;\n\
+             const FIRST_PART: u32 = {part}u;\nconst FIRST_WEIGHT: u32 = {weight}u;\n"
         );
     }
     if effects.has_tables() {
