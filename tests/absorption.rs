@@ -10,6 +10,7 @@ use gpu_trace::settings::Settings;
 use gpu_trace::statistics::normal_limit;
 use gpu_trace::verify::{Agreement, Random, Row, ULP, image_bits, means, settings, vector};
 
+use crate::common::images::{Left, assert_same, uniform};
 use crate::common::{probe, render_cpu, render_gpu, scene};
 
 const NO_HIT: f32 = 3.0e38;
@@ -142,6 +143,8 @@ fn a_ball_seen_through_its_centre_absorbs_along_its_diameter() {
         let scene = seen(4.0, 1.0e-4, &spheres);
         let film = render_gpu(&scene, &settings(&scene, 16, 16, 2048));
         let expected = |factor: f64| TINT.map(|a| through(r, (-factor * a * way).exp()));
+        let wanted = uniform(&film, expected(1.0));
+        let _left = Left::of(format!("a tinted ball, {name}"), &film, &wanted);
         let z = deviations(&film, expected(1.0));
         eprintln!("{name}: z = {z:?}");
         assert!(z.iter().all(|z| z.abs() < limit), "{name}: {z:?}");
@@ -159,6 +162,7 @@ fn a_tinted_ball_in_a_furnace_is_what_quadrature_says() {
     let spheres = material("tinted", 1.5, TINT) + &ball("tinted", 1.0, 0);
     let scene = seen(4.0, 40.0, &spheres);
     let film = render_gpu(&scene, &settings(&scene, 16, 16, 4096));
+    let _left = Left::alone("a tinted ball", &film);
     assert_eq!(film.tally().non_finite, 0);
     // By the impact parameter b of a ray: a way through the ball has the length 2 cos t, at every reflection.
     let radiance = |b: f64, absorption: f64| {
@@ -227,13 +231,14 @@ fn units_do_not_matter() {
         let absorption = TINT.map(|a| tint * a / unit);
         let text = material("tinted", 1.5, absorption) + &ball("tinted", unit, 0);
         let scene = seen(4.0 * unit, 36.0, &text);
-        image_bits(&render_gpu(&scene, &settings(&scene, 16, 16, 16)))
+        render_gpu(&scene, &settings(&scene, 16, 16, 16))
     };
     let whole = image(0, 1.0);
     for exponent in [-60, -20, 20, 60] {
-        assert_eq!(image(exponent, 1.0), whole, "2^{exponent}");
+        assert_same(format!("2^{exponent}"), &image(exponent, 1.0), &whole);
     }
-    assert_ne!(image(20, 1.001), whole, "companion");
+    let other = image(20, 1.001);
+    assert_ne!(image_bits(&other), image_bits(&whole), "companion");
 }
 
 #[test]
@@ -249,21 +254,28 @@ fn a_room_in_tinted_glass_is_full_of_it() {
             ball("tinted", 2.0, 0)
         ))
     };
+    let expected = |factor: f64| TINT.map(|a| (-factor * a).exp());
     let off = |film: &Film, factor: f64| {
-        let expected = TINT.map(|a| (-factor * a).exp());
-        let values = means(film);
+        let (values, expected) = (means(film), expected(factor));
         let off = values.iter().zip(expected.iter().cycle());
         off.map(|(x, y)| (x / y - 1.0).abs()).fold(0.0, f64::max)
     };
     let tinted = room(TINT);
     let settings = settings(&tinted, 8, 8, 16);
     // The length has some 8 roundings, the exponential 3 + 2 x, the sum 2.
-    let film = render_gpu(&tinted, &settings);
+    let (film, cpu) = (
+        render_gpu(&tinted, &settings),
+        render_cpu(&tinted, &settings),
+    );
+    let wanted = uniform(&film, expected(1.0));
+    let _left = [("GPU", &film), ("CPU", &cpu)]
+        .map(|(name, film)| Left::of(format!("a tinted room, {name}"), film, &wanted));
     assert!(off(&film, 1.0) < 25.0 * ULP, "{:e}", off(&film, 1.0));
     assert!(off(&film, 1.0001) > 25.0 * ULP, "companion");
-    assert!(off(&render_cpu(&tinted, &settings), 1.0) < 1.0e-6);
+    assert!(off(&cpu, 1.0) < 1.0e-6);
     // As dark as can be: no number overflows.
     let film = render_gpu(&room([0.0, 1.0e20, 1.0e20]), &settings);
+    let _dark = Left::alone("a dark room", &film);
     assert_eq!(film.tally().non_finite, 0);
     assert_eq!(film.mean(0), [1.0, 0.0, 0.0]);
 }

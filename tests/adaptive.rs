@@ -2,7 +2,8 @@
 
 use std::collections::BTreeSet;
 
-use crate::common::images::{assert_alike, mean};
+use crate::common::blocks::Blocks;
+use crate::common::images::{Left, assert_alike, assert_same, mean};
 use crate::common::{cpu_renderer, gpu_renderer, render_cpu, render_gpu, scene, scene_file};
 use crate::thorough::thorough;
 use gpu_trace::film::{
@@ -13,7 +14,7 @@ use gpu_trace::render::{Control, Renderer as _, render_quietly};
 use gpu_trace::scene::Scene;
 use gpu_trace::settings::{Integrator, Rect, Settings};
 use gpu_trace::statistics::mean_and_error;
-use gpu_trace::verify::{image_bits, settings};
+use gpu_trace::verify::settings;
 
 fn adaptive(scene: &Scene, width: u32, height: u32, spp: u64) -> Settings {
     Settings {
@@ -148,6 +149,7 @@ fn counts_add_up_and_the_error_falls() {
         adaptive: false,
         ..adaptive(&scene, 64, 48, 1024)
     });
+    let _left = Left::of("adaptive or not", film, &uniform.film);
     let error = |outcome: &gpu_trace::render::Outcome| outcome.estimate.error.expect("an error");
     eprintln!(
         "error {:.4}, uniform {:.4}",
@@ -157,7 +159,7 @@ fn counts_add_up_and_the_error_falls() {
     assert!(error(&outcome) < 0.8 * error(&uniform));
     // The last tiles' share of samples is what the error says.
     let again = renders(&adaptive(&scene, 64, 48, 1024));
-    assert_eq!(image_bits(&again.film), image_bits(film));
+    assert_same("adaptive again", &again.film, film);
 }
 
 #[test]
@@ -171,8 +173,7 @@ fn timing_changes_no_bits() {
     };
     let mut renderer: GpuRenderer = gpu_renderer(&scene, &settings).with_limits(limits);
     let parts = render_quietly(&mut renderer, &settings).unwrap_or_else(|e| panic!("{e}"));
-    let same = image_bits(&whole) == image_bits(&parts.film);
-    assert_alike("adaptive in parts", &parts.film, &whole, same, "other bits");
+    assert_same("adaptive in parts", &parts.film, &whole);
     let variances = |film: &Film| -> Vec<_> {
         (0..film.rect().pixels())
             .map(|i| film.variance_of_mean(i))
@@ -290,6 +291,7 @@ fn nothing_is_too_dark() {
 
     let mut renderer = gpu_renderer(&scene, &adaptive(&scene, width, height, 256));
     let (mut all, mut stopped, mut companion) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut images, mut stopped_images) = (Vec::new(), Vec::new());
     let mut looks = BTreeSet::new();
     // As many as the companion needs to be found; the long form finds half the bias.
     for seed in 1..=if thorough() { 600 } else { 150 } {
@@ -301,6 +303,7 @@ fn nothing_is_too_dark() {
         let film = run(&mut renderer, &settings);
         assert!(film.most_samples() > film.samples());
         all.push(mean(&green(&film)));
+        images.push(Blocks::of(&film, 1));
         let part = |samples| Settings {
             adaptive: false,
             samples,
@@ -317,10 +320,13 @@ fn nothing_is_too_dark() {
         assert!(Estimate::of(&film).error_at_most <= Some(0.12));
         looks.insert(film.samples());
         stopped.push(mean(&green(&film)));
+        stopped_images.push(Blocks::of(&film, 1));
         let first = run(&mut renderer, &part(0..64));
         let last = run(&mut renderer, &part(64..256));
         companion.push(careless(&first, &last));
     }
+    let _left = [("adaptive", &images), ("stopped", &stopped_images)]
+        .map(|(name, images)| Left::of(name, &Blocks::mean_of(images), &reference));
     let z = |name: &str, means: &[f64]| {
         let (mean, error) = mean_and_error(means);
         let (bias, error) = (mean - truth, error.hypot(noise));

@@ -1,7 +1,7 @@
 //! Layers beside the image: light by the kind of its path, and what is seen first.
 
 use crate::cli_support::{Folder, holds};
-use crate::common::images::assert_alike;
+use crate::common::images::{Left, assert_alike, assert_same, class_image, with_values};
 use crate::common::{gpu_renderer, render_cpu, render_gpu, scene, scene_file};
 use gpu_trace::film::{Film, LightClass};
 use gpu_trace::render::render_quietly;
@@ -25,9 +25,8 @@ fn with_aovs(scene: &Scene, integrator: Integrator, spp: u64) -> Settings {
     }
 }
 
-/// The mean light of each class over the image, and its standard error as the spread over pixels of two
-/// halves of the samples would have it; here from renders with several seeds.
-fn class_means(scene: &Scene, integrator: Integrator, seeds: u64) -> Vec<(f64, f64)> {
+/// Renders with several seeds.
+fn films(scene: &Scene, integrator: Integrator, seeds: u64) -> Vec<Film> {
     let mut renderer = gpu_renderer(scene, &with_aovs(scene, integrator, 256));
     let mut films = Vec::new();
     for seed in 0..seeds {
@@ -39,6 +38,11 @@ fn class_means(scene: &Scene, integrator: Integrator, seeds: u64) -> Vec<(f64, f
         let outcome = render_quietly(&mut renderer, &settings);
         films.push(outcome.unwrap_or_else(|e| panic!("{e}")).film);
     }
+    films
+}
+
+/// The mean light of each class over the image, and its standard error as the spread of films.
+fn class_means(films: &[Film]) -> Vec<(f64, f64)> {
     (0..5)
         .map(|class| {
             let mean = |film: &Film| {
@@ -61,18 +65,20 @@ fn the_classes_add_up_to_the_image() {
         for integrator in INTEGRATORS {
             let settings = with_aovs(&scene, integrator, 300);
             for film in [render_gpu(&scene, &settings), render_cpu(&scene, &settings)] {
-                for i in 0..film.rect().pixels() {
-                    let sums = film.aovs(i).expect("asked for");
-                    for (c, mean) in film.mean(i).into_iter().enumerate() {
-                        let sum: f64 = sums.classes.iter().map(|class| class[c]).sum();
+                let name = format!("{file}, {}", integrator.name());
+                let sum = |i: usize| {
+                    let classes = film.aovs(i).expect("asked for").classes;
+                    [0, 1, 2].map(|c| classes.iter().map(|class| class[c]).sum::<f64>() / 300.0)
+                };
+                let sums: Vec<[f64; 3]> = (0..film.rect().pixels()).map(sum).collect();
+                let of_sums = with_values(&film, sums.iter().copied());
+                let _left = Left::of(format!("classes, {name}"), &of_sums, &film);
+                for (i, sum) in sums.iter().enumerate() {
+                    for (sum, mean) in sum.iter().zip(film.mean(i)) {
                         // Plain sums of at most 256 numbers in f32.
                         let limit = 256.0 * gpu_trace::verify::ULP * mean;
-                        assert!(
-                            (sum / 300.0 - mean).abs() <= limit,
-                            "{file}, {}, pixel {i}: {} and {mean}",
-                            integrator.name(),
-                            sum / 300.0
-                        );
+                        let off = (sum - mean).abs();
+                        assert!(off <= limit, "{name}, pixel {i}: {sum} and {mean}");
                     }
                 }
             }
@@ -90,30 +96,30 @@ fn the_image_is_the_same_with_and_without() {
         ..with.clone()
     };
     let (with, without) = (render_gpu(&scene, &with), render_gpu(&scene, &without));
-    let same = with.pixels() == without.pixels();
-    assert_alike("with layers", &with, &without, same, "other bits");
+    assert_same("with layers", &with, &without);
     assert!(with.aovs(0).is_some() && without.aovs(0).is_none());
 }
 
 #[test]
 fn every_estimator_has_the_same_classes() {
     let scene = scene_file("scenes/tests/lamps.toml");
-    let reference = class_means(&scene, Integrator::Bsdf, 16);
+    let truth = films(&scene, Integrator::Bsdf, 16);
+    let reference = class_means(&truth);
     // A scene in which all kinds of paths matter.
     assert!(
         reference.iter().all(|(mean, _)| *mean > 0.0),
         "{reference:?}"
     );
     for integrator in [Integrator::Path, Integrator::Nee] {
-        let means = class_means(&scene, integrator, 16);
+        let found = films(&scene, integrator, 16);
+        let means = class_means(&found);
         for (class, (a, b)) in means.iter().zip(&reference).enumerate() {
+            let name = format!("{}, class {class}", integrator.name());
+            let [own, wanted] = [&found, &truth].map(|films| class_image(films, class));
+            let _left = Left::of(&name, &own, &wanted);
             let z = (a.0 - b.0) / a.1.hypot(b.1).max(1.0e-9 * b.0);
             // Ten comparisons with 30 degrees of freedom: a level of 1e-3 for all.
-            assert!(
-                z.abs() < 4.5,
-                "{}, class {class}: {a:?}, {b:?}",
-                integrator.name()
-            );
+            assert!(z.abs() < 4.5, "{name}: {a:?}, {b:?}");
         }
         // Companion: 5 % of the direct light counted as indirect would be found.
         let (direct, indirect) = (
@@ -147,14 +153,16 @@ fn classes_are_what_their_names_say() {
                 max_bounces,
                 ..with_aovs(&scene, integrator, spp)
             };
-            class_sums(&render_gpu(&scene, &settings))
+            let film = render_gpu(&scene, &settings);
+            let name = format!("{}, {max_bounces} bounces", integrator.name());
+            (class_sums(&film), Left::alone(name, &film))
         };
         // Without an event there is only what is seen itself; one makes it direct, or specular in mirrors.
-        let [emission, direct, indirect, specular, caustic] = limited(0);
+        let ([emission, direct, indirect, specular, caustic], _left) = limited(0);
         assert!(emission > 0.0 && direct + indirect + specular + caustic == 0.0);
-        let [_, direct, indirect, _, caustic] = limited(1);
+        let ([_, direct, indirect, _, caustic], _left) = limited(1);
         assert!(direct > 0.0 && indirect + caustic == 0.0);
-        let [_, _, indirect, specular, caustic] = limited(4);
+        let ([_, _, indirect, specular, caustic], _left) = limited(4);
         assert!(
             indirect > 0.0 && specular + caustic > 0.0,
             "{integrator:?}: {indirect}, {specular}, {caustic}"
@@ -163,6 +171,7 @@ fn classes_are_what_their_names_say() {
     // Of diffuse surfaces alone there are three classes.
     let lecture = scene_file("scenes/lecture.toml");
     let film = render_gpu(&lecture, &with_aovs(&lecture, Integrator::Path, 64));
+    let _left = Left::alone("lecture, classes", &film);
     let [emission, direct, indirect, specular, caustic] = class_sums(&film);
     assert!(emission > 0.0 && direct > 0.0 && indirect > 0.0 && specular + caustic == 0.0);
 }
@@ -188,6 +197,7 @@ fn what_is_seen_first_is_where_it_is() {
             ..with_aovs(&scene, Integrator::Path, 16)
         };
         for film in [render_gpu(&scene, &settings), render_cpu(&scene, &settings)] {
+            let _left = Left::alone(format!("seen first, {distance}"), &film);
             for i in 0..16 {
                 let sums = film.aovs(i).expect("asked for");
                 assert_eq!((sums.hits, sums.albedo), (16.0, [4.0, 8.0, 12.0]));

@@ -2,7 +2,9 @@
 
 use std::f64::consts::{PI, TAU};
 
-use crate::common::{render_gpu, scene};
+use crate::common::blocks::{Blocks, blocks_of_seeds, deviation};
+use crate::common::images::Left;
+use crate::common::{gpu_renderer, scene};
 use glam::DVec3;
 use gpu_trace::materials::car_paint::{CarPaint, Preset};
 use gpu_trace::materials::coat::Clearcoat;
@@ -10,9 +12,8 @@ use gpu_trace::materials::{ALL, Bsdf, Event, MaterialKind, Surface, Value};
 use gpu_trace::scene::Scene;
 use gpu_trace::scene::load::load_str;
 use gpu_trace::settings::{Integrator, Settings};
-use gpu_trace::statistics::mean_and_error;
 use gpu_trace::verify::bsdf::draw::OFFSETS;
-use gpu_trace::verify::{Random, means, settings};
+use gpu_trace::verify::{Random, settings};
 
 /// All cases of the material.
 fn cases() -> Vec<MaterialKind> {
@@ -367,46 +368,39 @@ fn coated_ball(coat: &str) -> Scene {
     ))
 }
 
-/// The image's mean and its standard error, from some seeds.
-fn seen(scene: &Scene, integrator: Integrator) -> (f64, f64) {
-    let mean = |seed: u64| {
-        let settings = Settings {
-            integrator,
-            seed,
-            ..settings(scene, 24, 24, 256)
-        };
-        let all = means(&render_gpu(scene, &settings));
-        all.iter().sum::<f64>() / all.len() as f64
+/// The image and its mean, from some seeds.
+fn seen(scene: &Scene, integrator: Integrator) -> Blocks {
+    let settings = Settings {
+        integrator,
+        ..settings(scene, 24, 24, 256)
     };
-    mean_and_error(&(1..=8).map(mean).collect::<Vec<f64>>())
+    blocks_of_seeds(gpu_renderer(scene, &settings), &settings, 1..9, 1)
 }
 
 #[test]
 fn every_integrator_sees_the_coat() {
     let coated = coated_ball("clearcoat = { ior = 1.8 }");
-    let (truth, error) = seen(&coated, Integrator::Bsdf);
+    let truth = seen(&coated, Integrator::Bsdf);
     // Student's t with some 14 degrees of freedom, at 1e-4: 5.4.
-    let off = |(mean, other): (f64, f64)| (mean - truth).abs() / error.hypot(other);
+    let off = |found: &Blocks| deviation(found.image, truth.image).abs();
     for integrator in [
         Integrator::Path,
         Integrator::Nee,
         Integrator::Lecture { termination: 0.2 },
     ] {
         let found = seen(&coated, integrator);
-        eprintln!("{integrator:?}: {found:?} for {truth} +- {error}");
-        assert!(
-            off(found) < 5.4,
-            "{integrator:?}: {found:?} for {truth} +- {error}"
-        );
-        assert!(found.1 < 0.01 * truth, "{found:?}");
+        let name = format!("a coat, {}", integrator.name());
+        let _left = Left::of(&name, &found, &truth);
+        let [[mean, variance], [wanted, own]] = [found.image, truth.image];
+        let (error, own) = (variance.sqrt(), own.sqrt());
+        let both = format!("{name}: {mean} +- {error} for {wanted} +- {own}");
+        eprintln!("{both}");
+        assert!(off(&found) < 5.4, "{both}");
+        assert!(error < 0.01 * wanted, "{both}");
     }
     // Companion: without the coat's reflection, by an index that has hardly any.
-    assert!(
-        off(seen(
-            &coated_ball("clearcoat = { ior = 1.01 }"),
-            Integrator::Path
-        )) > 5.4
-    );
+    let other = coated_ball("clearcoat = { ior = 1.01 }");
+    assert!(off(&seen(&other, Integrator::Path)) > 5.4);
 }
 
 /// What is said of a paint with these lines.

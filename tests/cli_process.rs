@@ -6,6 +6,7 @@ use std::thread::sleep;
 use std::time::Duration;
 
 use crate::cli_support::{Background, Folder, Run, holds};
+use crate::common::images::assert_same;
 use serde_json::json;
 
 #[test]
@@ -39,7 +40,8 @@ fn a_signal_ends_a_render_with_what_there_is() {
         let spp = stats["spp"].as_u64().expect("a number");
         let part = folder.npy("r.npy");
         let sample = format!("--size 16x16 --spp {spp} --backend {backend}");
-        assert_eq!(part.pixels, folder.render(&sample).0.pixels, "{spp} spp");
+        let name = format!("SIG{signal} on {backend}");
+        assert_same(name, &part, &folder.render(&sample).0);
     }
 }
 

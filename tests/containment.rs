@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use crate::common::images::{Left, uniform};
 use crate::common::{render_cpu, render_gpu, scene};
 use gpu_trace::effects::{Effect, Effects};
 use gpu_trace::placement::{Placement, Side};
@@ -114,12 +115,15 @@ fn is_white(name: &str, scene: &Scene) {
             ..settings(scene, 16, 16, 64)
         };
         let film = render_gpu(scene, &settings);
+        let white = uniform(&film, [1.0; 3]);
+        let _left = Left::of(format!("{name}, {geometry:?}"), &film, &white);
         assert_eq!(film.tally().cut_paths, 0, "{name}");
         for mean in means(&film) {
             assert!((mean - 1.0).abs() < 1.0e-3, "{name}, {geometry:?}: {mean}");
         }
     }
     let film = render_cpu(scene, &settings(scene, 16, 16, 16));
+    let _left = Left::alone(format!("{name}, CPU"), &film);
     assert!(means(&film).iter().all(|m| *m < 1.0 + 1.0e-9), "{name}");
 }
 

@@ -1,16 +1,20 @@
 //! The same bits whenever the same samples are rendered: whatever the crop, the dispatches and the
 //! parts. Other seeds give other bits.
 
+use std::iter::zip;
+
+use crate::common::images::{Left, assert_same, cut, with_values};
 use crate::common::{gpu_renderer, render_cpu, render_gpu, scene_file};
 use gpu_trace::film::Film;
 use gpu_trace::gpu::renderer::DispatchLimits;
+use gpu_trace::image::Picture;
 use gpu_trace::render::render_quietly;
 use gpu_trace::sampler::Sampler;
 use gpu_trace::scene::MAX_SPP;
 use gpu_trace::scene::Scene;
 use gpu_trace::settings::{GeometryChoice, Rect, Settings};
 use gpu_trace::statistics::mean_and_error;
-use gpu_trace::verify::{U, image_bits, means, settings};
+use gpu_trace::verify::{U, image_bits, means, settings, share_beyond, share_off};
 
 /// A scene with all materials, a pole sphere, light and an environment.
 fn glass_ball() -> Scene {
@@ -26,7 +30,7 @@ fn the_same_seed_gives_the_same_bits_and_another_gives_others() {
     let scene = glass_ball();
     let one = settings(&scene, 48, 40, 64);
     let first = render_gpu(&scene, &one);
-    assert_eq!(image_bits(&first), bits(&scene, &one));
+    assert_same("the same seed", &render_gpu(&scene, &one), &first);
     // The background is the same for all seeds: what has a variance counts.
     let noisy: Vec<usize> = (0..one.crop.pixels())
         .flat_map(|i| {
@@ -61,7 +65,7 @@ fn the_same_seed_gives_the_same_bits_and_another_gives_others() {
 fn a_crop_has_the_whole_images_bits() {
     let scene = glass_ball();
     let whole = settings(&scene, 61, 47, 12);
-    let image = bits(&scene, &whole);
+    let image = render_gpu(&scene, &whole);
     for crop in [
         Rect {
             x: 0,
@@ -88,19 +92,12 @@ fn a_crop_has_the_whole_images_bits() {
             height: 8,
         },
     ] {
-        let part = bits(
-            &scene,
-            &Settings {
-                crop,
-                ..whole.clone()
-            },
-        );
-        for y in 0..crop.height {
-            let from = (3 * ((crop.y + y) * 61 + crop.x)) as usize;
-            let row = &image[from..from + 3 * crop.width as usize];
-            let start = (3 * y * crop.width) as usize;
-            assert_eq!(row, &part[start..start + row.len()], "row {y} of {crop:?}");
-        }
+        let settings = Settings {
+            crop,
+            ..whole.clone()
+        };
+        let part = render_gpu(&scene, &settings);
+        assert_same(format!("{crop:?}"), &part, &cut(&image, crop));
     }
 }
 
@@ -126,7 +123,7 @@ fn any_split_into_dispatches_gives_the_same_bits() {
                 "samples {:?}, {tiles} tiles, {samples} samples",
                 settings.samples
             );
-            assert_eq!(image_bits(&whole), image_bits(&split), "{place}");
+            assert_same(&place, &split, &whole);
             assert_eq!(whole.tally().rays, split.tally().rays, "{place}");
             for i in 0..settings.crop.pixels() {
                 assert_eq!(
@@ -161,6 +158,10 @@ fn of_parts(scene: &Scene, base: &Settings, ends: &[u64]) -> Vec<f64> {
         .collect()
 }
 
+fn values(film: &Film, values: &[f64]) -> Picture {
+    with_values(film, values.as_chunks().0.iter().copied())
+}
+
 #[test]
 fn parts_average_to_the_whole() {
     let scene = glass_ball();
@@ -171,8 +172,10 @@ fn parts_average_to_the_whole() {
         &[255, 256, 257, 300],
     ] {
         let whole = settings(&scene, 24, 20, ends[ends.len() - 1]);
-        let image = render_gpu(&scene, &whole).pixels();
+        let film = render_gpu(&scene, &whole);
+        let image = film.pixels();
         let parts = of_parts(&scene, &whole, ends);
+        let _left = Left::of(format!("parts {ends:?}"), &film, &values(&film, &parts));
         for (x, part) in image.as_flattened().iter().zip(parts) {
             let off = (f64::from(*x) - part).abs();
             // One ulp of f32.
@@ -204,25 +207,20 @@ fn sums_round_only_within_blocks() {
     // itself; over the blocks, high and low part of a sum are exact together.
     let scene = glass_ball();
     let whole = settings(&scene, 24, 20, 8);
-    let film = means(&render_gpu(&scene, &whole));
+    let film = render_gpu(&scene, &whole);
     let singles = of_parts(&scene, &whole, &[1, 2, 3, 4, 5, 6, 7, 8]);
-    for (mean, single) in film.iter().zip(singles) {
+    let _left = Left::of("single samples", &film, &values(&film, &singles));
+    for (mean, single) in means(&film).iter().zip(singles) {
         let off = (mean - single).abs();
         assert!(off <= 3.0 * U * single, "{mean} and {single}");
     }
 }
 
-/// Share of the values that differ by more than `tolerance`, relative; and z of the mean.
-fn compare(a: &Film, b: &Film, tolerance: f64) -> (f64, f64) {
-    let (a, b) = (means(a), means(b));
-    let differences: Vec<f64> = a.iter().zip(&b).map(|(x, y)| x - y).collect();
-    let apart = a
-        .iter()
-        .zip(&b)
-        .filter(|(x, y)| (*x - *y).abs() > tolerance * x.abs().max(y.abs()));
-    let share = apart.count() as f64 / a.len() as f64;
+/// z of the mean of the differences.
+fn difference(a: &Film, b: &Film) -> f64 {
+    let differences: Vec<f64> = zip(means(a), means(b)).map(|(x, y)| x - y).collect();
     let (mean, error) = mean_and_error(&differences);
-    (share, if mean == 0.0 { 0.0 } else { mean / error })
+    if mean == 0.0 { 0.0 } else { mean / error }
 }
 
 #[test]
@@ -248,7 +246,9 @@ fn baked_and_list_agree() {
         let (baked, list) = (film(GeometryChoice::Baked), film(GeometryChoice::List));
         // A driver may contract the two kernels differently, and a path that bounces often between
         // curved mirrors and glass multiplies such a difference: nearly all values, not all.
-        let (share, z) = compare(&baked, &list, 1.0e-4);
+        let share = share_beyond(&list, &baked, 1.0e-4);
+        let z = difference(&baked, &list);
+        let _left = Left::of(format!("{name}, list"), &list, &baked);
         eprintln!(
             "{name}: {:.3} % of the values differ, z = {z:.2}",
             100.0 * share
@@ -264,7 +264,7 @@ fn baked_and_list_agree() {
             },
         );
         if name != "tests/lens" {
-            let (share, _) = compare(&baked, &other, 1.0e-4);
+            let share = share_beyond(&other, &baked, 1.0e-4);
             assert!(share > 0.3, "{name}: only {share} differ with another seed");
         }
     }
@@ -287,7 +287,8 @@ fn odd_sizes_render() {
         assert!(film.tally().rays >= u64::from(width * height) * spp);
         // Every pixel is there: the same as the reference's, but for paths that part.
         let reference = render_cpu(&scene, &settings);
-        let (share, _) = compare(&film, &reference, 1.0e-3);
+        let share = share_off(&film, &reference);
+        let _left = Left::of(format!("{width} x {height}"), &film, &reference);
         assert!(
             share < 0.05,
             "{width} x {height}: {share} of the values differ"
@@ -302,22 +303,15 @@ fn seams_between_regions_do_not_show() {
     // Regions are at most 1024 pixels wide: the columns around the seam by themselves.
     let scene = glass_ball();
     let whole = settings(&scene, 2100, 2, 4);
-    let image = bits(&scene, &whole);
+    let image = render_gpu(&scene, &whole);
     let crop = Rect {
         x: 1000,
         y: 0,
         width: 60,
         height: 2,
     };
-    let part = bits(&scene, &Settings { crop, ..whole });
-    for y in 0..2 {
-        let from = 3 * (y * 2100 + 1000);
-        assert_eq!(
-            image[from..from + 180],
-            part[y * 180..(y + 1) * 180],
-            "row {y}"
-        );
-    }
+    let part = render_gpu(&scene, &Settings { crop, ..whole });
+    assert_same("seam", &part, &cut(&image, crop));
 }
 
 #[test]
@@ -339,7 +333,8 @@ fn sample_indices_go_on_past_32_bits() {
         let film = render_gpu(&scene, &settings);
         assert_eq!(film.samples(), samples.end - samples.start);
         let reference = render_cpu(&scene, &settings);
-        let (share, _) = compare(&film, &reference, 1.0e-3);
+        let share = share_off(&film, &reference);
+        let _left = Left::of(format!("samples {samples:?}"), &film, &reference);
         assert!(
             share < 0.05,
             "{samples:?}: {share} of the values differ from the reference's"

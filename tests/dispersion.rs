@@ -2,6 +2,7 @@
 //! order. The functions against their twins are case 43 of `check`.
 
 use glam::{DVec2, DVec3};
+use gpu_trace::film::Film;
 use gpu_trace::materials::dielectric::{Glass, Index};
 use gpu_trace::materials::{Bsdf as _, MaterialKind};
 use gpu_trace::sampling::spectrum::{INTEGRALS, srgb};
@@ -10,7 +11,7 @@ use gpu_trace::settings::{Integrator, Settings};
 use gpu_trace::statistics::normal_limit;
 use gpu_trace::verify::settings;
 
-use crate::common::images::{assert_uniform, channels, fault};
+use crate::common::images::{Left, assert_uniform, channels, fault, uniform};
 use crate::common::{render_gpu, scene};
 
 /// Balls of these materials in an environment of 1.
@@ -154,8 +155,8 @@ fn a_white_furnace_stays_white_in_the_mean() {
     }
 }
 
-/// The mean place along x of each channel's light, and its standard error, of a lamp seen through a ball.
-fn places(glass: &str) -> [[f64; 2]; 3] {
+/// A lamp seen through a ball.
+fn through(glass: &str) -> Film {
     let scene = scene(&format!(
         "[camera]\nposition = [0, 0, 6]\nlook_at = [0, 0, 0]\nfov = 20.0\n[image]\nwidth = 32\nheight = 8\n\
          [material.glass]\ntype = \"dielectric\"\n{glass}\n\
@@ -163,7 +164,11 @@ fn places(glass: &str) -> [[f64; 2]; 3] {
          [[sphere]]\ncenter = [0, 0, 0]\nradius = 1\nmaterial = \"glass\"\n\
          [[sphere]]\ncenter = [2.2, 0, -3]\nradius = 0.6\nmaterial = \"lamp\"\n"
     ));
-    let film = render_gpu(&scene, &settings(&scene, 32, 8, 8192));
+    render_gpu(&scene, &settings(&scene, 32, 8, 8192))
+}
+
+/// The mean place along x of each channel's light of the lamp, and its standard error.
+fn places(film: &Film) -> [[f64; 2]; 3] {
     std::array::from_fn(|c| {
         let mut sums = [0.0; 2];
         // The lamp itself is seen on the right; the ball turns what is behind it round.
@@ -185,16 +190,18 @@ fn places(glass: &str) -> [[f64; 2]; 3] {
 fn colours_come_in_their_order() {
     // The index falls with the wavelength: blue is bent most, so that its image is nearest to the axis, on the right.
     for rest in ["", "roughness = 0.15"] {
-        let [red, green, blue] = places(&format!("preset = \"SF10\"\n{rest}"));
+        let film = through(&format!("preset = \"SF10\"\n{rest}"));
+        let _left = Left::alone(format!("colours in their order, {rest}"), &film);
+        let [red, green, blue] = places(&film);
         eprintln!("{rest}: {red:?}, {green:?}, {blue:?}");
         // Of the same paths: their errors are no larger than if they were independent.
         let apart = |a: [f64; 2], b: [f64; 2]| (b[0] - a[0]) / a[1].hypot(b[1]);
         assert!(apart(red, blue) > 3.9, "{rest}");
         assert!(red[0] < green[0] && green[0] < blue[0], "{rest}");
         // Companions: the other way round, and not at all.
-        let wrong = places(&format!("cauchy = [1.8, -0.03]\n{rest}"));
+        let wrong = places(&through(&format!("cauchy = [1.8, -0.03]\n{rest}")));
         assert!(apart(wrong[0], wrong[2]) < -3.9, "{rest}: {wrong:?}");
-        let plain = places(&format!("ior = 1.73\n{rest}"));
+        let plain = places(&through(&format!("ior = 1.73\n{rest}")));
         assert!(
             plain[0] == plain[1] && plain[1] == plain[2],
             "{rest}: {plain:?}"
@@ -213,6 +220,7 @@ fn no_colour_is_clamped() {
          [[sphere]]\ncenter = [0, 1.5, -3]\nradius = 0.1\nmaterial = \"lamp\"\n",
     );
     let film = render_gpu(&scene, &settings(&scene, 96, 24, 2048));
+    let _left = Left::alone("colours below 0", &film);
     assert_eq!(film.tally().non_finite, 0);
     let pixels = film.rect().pixels();
     let below = |c: usize| {
@@ -252,6 +260,8 @@ fn a_camera_in_glass_begins_with_a_wavelength() {
         })
         .sum();
     let film = render_gpu(&scene, &settings(&scene, 16, 16, 4096));
+    let wanted = uniform(&film, expected.to_array());
+    let _left = Left::of("a camera in glass", &film, &wanted);
     let limit = normal_limit(3);
     for (c, [mean, error]) in channels(&film).into_iter().enumerate() {
         let z = (mean - expected[c]) / error;

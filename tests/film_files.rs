@@ -8,6 +8,7 @@ use std::thread::sleep;
 use std::time::Duration;
 
 use crate::cli_support::{Background, Folder, bits, holds};
+use crate::common::images::{assert_alike, assert_same};
 use gpu_trace::film::{AovSums, Film, Record};
 use gpu_trace::film_file::{self, About, FilmFile, decode, encode};
 use gpu_trace::image::Picture;
@@ -20,6 +21,18 @@ const SCENE: &str = "good.toml --backend cpu";
 pub(crate) fn alike(a: &Picture, b: &Picture) -> bool {
     let pairs = bits(a).into_iter().zip(bits(b));
     pairs.into_iter().all(|(a, b)| a.abs_diff(b) <= 1)
+}
+
+/// Fails unless all values are within one ulp of f32.
+#[track_caller]
+pub(crate) fn assert_near(name: &str, found: &Picture, wanted: &Picture) {
+    assert_alike(
+        name,
+        found,
+        wanted,
+        alike(found, wanted),
+        "more than an ulp",
+    );
 }
 
 /// Whether these are within one ulp of f32.
@@ -100,8 +113,9 @@ fn parts_are_one_render_in_any_order() {
         folder.ok(&format!(
             "merge {order} -o m.npy -o m.exr --stats m.json --checkpoint m.film"
         ));
-        assert!(alike(&folder.npy("m.npy"), &whole), "{order}");
-        assert!(alike(&stderr_of(&folder, "m.exr"), &stderr), "{order}");
+        assert_near(order, &folder.npy("m.npy"), &whole);
+        let name = format!("stderr, {order}");
+        assert_near(&name, &stderr_of(&folder, "m.exr"), &stderr);
         let merged = folder.json("m.json");
         assert!(near(error_of(&merged), error_of(&stats)), "{order}");
         for same in ["spp", "sample_range", "samples", "rays", "bounce_limit"] {
@@ -135,7 +149,7 @@ fn parts_cut_anywhere_give_the_image() {
     let (whole, stats) = folder.render(&format!("{SCENE} --spp 600"));
     parts(&folder, &[37, 301, 600], "");
     folder.ok("merge 1.film 0.film 2.film -o m.npy --stats m.json");
-    assert!(alike(&folder.npy("m.npy"), &whole));
+    assert_near("parts cut anywhere", &folder.npy("m.npy"), &whole);
     let error = error_of(&folder.json("m.json"));
     // Of the same samples in other batches; not the same, or the bound of one ulp above says nothing.
     let ratio = error / error_of(&stats);
@@ -180,11 +194,11 @@ fn parts_that_are_no_parts_are_refused() {
     // Companion: the right parts; and what filled the gap fits later.
     folder.ok("merge 0.film 1.film 2.film -o m.npy");
     folder.ok("merge gaps.film 1.film -o n.npy --checkpoint all.film");
-    assert!(alike(&folder.npy("n.npy"), &folder.npy("m.npy")));
+    assert_near("a gap filled", &folder.npy("n.npy"), &folder.npy("m.npy"));
     // And what is whole can go on, to the image of the merge.
     let (longer, _) = folder.render(&format!("{SCENE} --spp 256"));
     folder.ok("resume all.film --spp 256");
-    assert!(alike(&folder.npy("n.npy"), &longer));
+    assert_near("a merge that goes on", &folder.npy("n.npy"), &longer);
 }
 
 #[test]
@@ -206,7 +220,7 @@ fn a_render_goes_on_as_it_was_begun() {
     assert!(folder.read("a.film") == before);
     let (longer, stats) = folder.render(&format!("{SCENE} --spp 200 --max-bounces 1"));
     folder.ok("resume a.film --spp 200 --stats a.json");
-    assert_eq!(bits(&folder.npy("a.npy")), bits(&longer));
+    assert_same("a render that goes on", &folder.npy("a.npy"), &longer);
     let resumed = folder.json("a.json");
     for same in ["estimated_error", "bounce_limit", "ledger", "sample_range"] {
         assert_eq!(resumed[same], stats[same]);
@@ -224,7 +238,7 @@ fn a_render_goes_on_as_it_was_begun() {
     ));
     folder.ok("resume p.film --spp 64");
     let (part, _) = folder.render(&format!("{SCENE} --sample-range 64..128"));
-    assert!(alike(&folder.npy("p.npy"), &part));
+    assert_near("a part that goes on", &folder.npy("p.npy"), &part);
 }
 
 #[test]
@@ -241,7 +255,7 @@ fn an_interrupted_render_goes_on() {
     let spp = film_of(&folder, "i.film").film.samples() + 100;
     folder.ok(&format!("resume i.film --spp {spp}"));
     let (whole, _) = folder.render(&format!("{SCENE} --spp {spp}"));
-    assert!(alike(&folder.npy("i.npy"), &whole));
+    assert_near("after an interrupt", &folder.npy("i.npy"), &whole);
 }
 
 #[test]
@@ -268,7 +282,7 @@ fn a_kill_at_any_moment_costs_no_bit() {
         }
         let run = folder.run(&command);
         assert_eq!(run.code, Some(0), "{run:?}");
-        assert_eq!(bits(&folder.npy("k.npy")), bits(&whole), "{more}");
+        assert_same(format!("killed {more}"), &folder.npy("k.npy"), &whole);
         let resumed = folder.json("k.json");
         for same in [
             "estimated_error",
@@ -311,7 +325,7 @@ fn scenes_are_found_again() {
             fs::remove_file(folder.path("scene.toml")).expect("it was there");
         }
         folder.ok(&format!("resume {number}.film --spp 32"));
-        assert_eq!(bits(&folder.npy("x.npy")), bits(&whole), "{scene}");
+        assert_same(format!("resumed {scene}"), &folder.npy("x.npy"), &whole);
     }
     // Elsewhere, with the film file beside.
     fs::create_dir(folder.path("away")).expect("a folder");

@@ -6,6 +6,7 @@ use std::fmt::Write as _;
 use serde_json::Value;
 
 use crate::cli_support::{Background, Folder, GOOD, bits, holds};
+use crate::common::images::assert_same;
 
 /// Four balls that move apart, and a number of each that grows; five frames.
 fn folder() -> Folder {
@@ -51,7 +52,7 @@ fn each_frame_is_the_image_of_that_frame() {
         .collect();
     assert_eq!(made, ["f001.npy", "f003.npy", "s1.json", "s3.json"]);
     let (third, stats) = folder.render(&format!("third.toml {SMALL} -o t.npy"));
-    assert_eq!(bits(&third), bits(&folder.npy("f003.npy")));
+    assert_same("frame 3", &folder.npy("f003.npy"), &third);
     assert_eq!(stats["scene_hash"], folder.json("s3.json")["scene_hash"]);
     // Companion: another frame is another image.
     assert_ne!(bits(&third), bits(&folder.npy("f001.npy")));

@@ -1,6 +1,6 @@
 //! Scenes whose image is one number, known exactly.
 
-use crate::common::images::assert_uniform;
+use crate::common::images::{Left, assert_uniform, uniform};
 use crate::common::{render_gpu, scene, scene_file};
 use gpu_trace::film::Film;
 use gpu_trace::scene::Scene;
@@ -89,6 +89,11 @@ fn a_lossless_closed_furnace_stops_at_the_limit() {
             ..settings(&scene, 16, 16, 16)
         };
         let film = render_gpu(&scene, &settings);
+        let _left = Left::of(
+            format!("lossless, {geometry:?}"),
+            &film,
+            &uniform(&film, [65.0; 3]),
+        );
         // Every sum is a small whole number.
         assert_eq!(deviation(&film, 65.0), 0.0);
         assert_eq!(film.tally().cut_paths, 256 * 16);
@@ -111,6 +116,8 @@ fn paths_of_any_length_are_whole() {
             ..settings(&scene, 8, 8, 16)
         };
         let film = render_gpu(&scene, &settings);
+        let wanted = uniform(&film, [10_001.0; 3]);
+        let _left = Left::of(format!("long, {geometry:?}"), &film, &wanted);
         assert_eq!(deviation(&film, 10_001.0), 0.0, "{geometry:?}");
         assert_eq!(film.tally().rays, 64 * 16 * 10_001, "{geometry:?}");
     }
@@ -122,6 +129,7 @@ fn roulette_does_not_change_the_mean() {
     let scene = closed(0.5, 1.0);
     let film = render_gpu(&scene, &settings(&scene, 32, 32, 256));
     let (expected, _) = furnace(0.5, 64);
+    let _left = Left::of("roulette", &film, &uniform(&film, [expected; 3]));
     let z = |expected: f64| {
         let (mean, error) = gpu_trace::statistics::mean_and_error(&red(&film));
         (mean - expected) / error
@@ -148,6 +156,7 @@ fn the_lectures_estimator_has_the_same_mean() {
         ..settings(&scene, 32, 32, 1024)
     };
     let film = render_gpu(&scene, &settings);
+    let _left = Left::of("the lecture's furnace", &film, &uniform(&film, [2.0; 3]));
     let (mean, error) = gpu_trace::statistics::mean_and_error(&red(&film));
     let z = (mean - 2.0) / error;
     assert!(z.abs() < 3.9, "{mean} +- {error}");
@@ -272,6 +281,7 @@ fn the_reflective_furnace_is_its_albedo() {
     let scene = scene_file("scenes/tests/white-furnace-reflective.toml");
     let settings = settings(&scene, 65, 65, 4096);
     let film = render_gpu(&scene, &settings);
+    let _left = Left::alone("the reflective furnace", &film);
     let expected = 0.37 + 0.62518;
     let middle: Vec<f64> = (31..34)
         .flat_map(|y| (31..34).map(move |x| y * 65 + x))
@@ -302,6 +312,8 @@ fn a_constant_stays_what_it_is_over_many_samples() {
     );
     for spp in [1, 3, 16, 100, 256, 4096] {
         let film = render_gpu(&scene, &settings(&scene, 8, 8, spp));
+        let wanted = uniform(&film, [0.1f32, 0.7, 0.3].map(f64::from));
+        let _left = Left::of(format!("a constant, {spp} samples"), &film, &wanted);
         for i in 0..64 {
             for (mean, value) in film.mean(i).iter().zip([0.1f32, 0.7, 0.3]) {
                 let off = (mean / f64::from(value) - 1.0).abs();
@@ -329,6 +341,7 @@ fn a_constant_stays_what_it_is_over_many_samples() {
 fn an_empty_scene_is_its_environment() {
     let scene = scene_file("scenes/tests/empty.toml");
     let film = render_gpu(&scene, &settings(&scene, 16, 16, 256));
+    let _left = Left::of("empty", &film, &uniform(&film, [0.25, 0.5, 1.0]));
     // Powers of two: nothing is rounded.
     assert!((0..256).all(|i| film.mean(i) == [0.25, 0.5, 1.0]));
     assert_eq!(film.tally().rays, 256 * 256);

@@ -4,7 +4,7 @@
 
 use std::fmt::Write as _;
 
-use crate::common::images::assert_alike;
+use crate::common::images::{Left, assert_alike, uniform};
 use crate::common::{render_cpu, render_gpu, scene};
 use gpu_trace::film::Film;
 use gpu_trace::scene::Scene;
@@ -257,6 +257,8 @@ fn furnaces_of_any_size_and_albedo_reach_their_radiance() {
             let (mean, error) = mean_and_error(&values);
             // The kernel's albedo is the f32 one; an f32 sum of as many terms as a path has.
             let expected = 1.0 / (1.0 - f64::from(albedo as f32));
+            let name = format!("furnace of {radius:e}, albedo {albedo}");
+            let _left = Left::of(name, &film, &uniform(&film, [expected; 3]));
             let rounding = 2.0 * gpu_trace::verify::U / (1.0 - albedo);
             let off = |expected: f64| {
                 ((mean / expected - 1.0).abs() - rounding) * expected / error.max(1.0e-9)

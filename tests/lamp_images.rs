@@ -13,12 +13,14 @@ use gpu_trace::scene::Scene;
 use gpu_trace::settings::{GeometryChoice, Integrator, LightSampling, Offset, Settings};
 use gpu_trace::verify::settings;
 
+use crate::common::blocks::Blocks;
+use crate::common::images::Left;
 use crate::common::{gpu, gpu_renderer, job, scene, scene_file};
 use crate::thorough::thorough;
 
 /// Pixels of a side of the image, and of the blocks whose means are compared.
 const SIZE: u32 = 64;
-const BLOCK: u32 = 8;
+const BLOCK: usize = 8;
 
 /// A camera over a floor, with the spheres of a case. All of the floor that it sees is near to them: far away samples that
 /// find an image by chance are so few that none of them tells the variance.
@@ -110,41 +112,7 @@ fn imaged(scene: &Scene, spp: u64) -> Settings {
 fn film(renderer: GpuRenderer, settings: &Settings, seed: u64) -> Film {
     let mut renderer = renderer.with_seed(seed);
     let outcome = render_quietly(&mut renderer, settings).unwrap_or_else(|e| panic!("{e}"));
-    assert_eq!(outcome.film.tally().non_finite, 0);
     outcome.film
-}
-
-/// Means of blocks, by channel, with their variances; and at last that of the image.
-fn blocks(film: &Film) -> Vec<[f64; 2]> {
-    let across = SIZE / BLOCK;
-    let mut found = vec![[0.0; 2]; (across * across * 3 + 1) as usize];
-    let last = found.len() - 1;
-    for i in 0..SIZE * SIZE {
-        let block = 3 * (i / SIZE / BLOCK * across + i % SIZE / BLOCK) as usize;
-        let mean = film.mean(i as usize);
-        let variance = film.variance_of_mean(i as usize).expect("16 batches");
-        for c in 0..3 {
-            found[block + c][0] += mean[c];
-            found[block + c][1] += variance[c];
-        }
-        found[last][0] += mean.iter().sum::<f64>();
-        // The channels of a pixel go together: their deviations add.
-        found[last][1] += variance.iter().map(|v| v.sqrt()).sum::<f64>().powi(2);
-    }
-    found
-}
-
-/// The mean square of z over blocks, z of the image, and the half of the 99 % interval of its mean, relative.
-fn apart(a: &Film, b: &Film) -> [f64; 3] {
-    let z = |([a, v], [b, w]): ([f64; 2], [f64; 2])| (a - b) / (v + w).sqrt();
-    let (a, b) = (blocks(a), blocks(b));
-    let (last, first) = (a[a.len() - 1], b[b.len() - 1]);
-    let mut all: Vec<f64> = std::iter::zip(a, b).map(z).collect();
-    let total = all.pop().unwrap_or_default();
-    all.retain(|z| z.is_finite());
-    let mean = all.iter().map(|z| z * z).sum::<f64>() / all.len() as f64;
-    let unseen = 2.576 * (last[1] + first[1]).sqrt() / first[0];
-    [mean, total.abs(), unseen]
 }
 
 /// What the mean of the squares may be: 192 blocks, whose channels go together, are some 64 independent ones, so that it
@@ -169,8 +137,11 @@ fn it_changes_no_mean() {
         }
         let truth = film(gpu_renderer(&scene, &without), &without, 1);
         let found = film(gpu_renderer(&scene, &with), &with, 2);
-        let [squares, z, unseen] = apart(&found, &truth);
-        let gain = blocks(&truth).last().expect("all")[1] / blocks(&found).last().expect("all")[1];
+        let _left = Left::of(format!("lamp images, {name}"), &found, &truth);
+        let wanted = Blocks::of(&truth, BLOCK);
+        let blocks = Blocks::of(&found, BLOCK);
+        let [squares, z, unseen] = blocks.apart(&wanted);
+        let gain = wanted.image[1] / blocks.image[1];
         let rays = |film: &Film| film.tally().rays as f64 / film.paths() as f64;
         eprintln!(
             "{name}: squares of z {squares:.3}; mean: z {z:.2}, biases below {unseen:.5} are not seen; \
@@ -183,7 +154,8 @@ fn it_changes_no_mean() {
         let twice = [("IMAGED", 2.0)];
         let renderer = GpuRenderer::with_constants(gpu(), &job, &twice);
         let renderer = renderer.unwrap_or_else(|e| panic!("{e}"));
-        let [squares, z, _] = apart(&film(renderer, &with, 2), &truth);
+        let wrong = Blocks::of(&film(renderer, &with, 2), BLOCK);
+        let [squares, z, _] = wrong.apart(&wanted);
         eprintln!("{name}, taken for more: squares of z {squares:.3}; mean: z {z:.2}");
         assert!(squares > APART || z > 4.0, "{name}: {squares} {z}");
     }

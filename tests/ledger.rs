@@ -1,8 +1,9 @@
 //! What the ledger says that settings took, against analytic truth and against renders.
 
+use crate::common::images::Left;
 use crate::common::{gpu, job, render_gpu, scene, scene_file};
 use gpu_trace::backend::Backend;
-use gpu_trace::film::Estimate;
+use gpu_trace::film::{Estimate, Film};
 use gpu_trace::job::prepare;
 use gpu_trace::ledger::{Entry, audit};
 use gpu_trace::scene::Scene;
@@ -75,20 +76,22 @@ fn an_offset_takes_what_renders_lack() {
         .find(|e| e.setting == "offset")
         .expect("an entry");
     // Other seeds: nothing is shared with the audit.
-    let light = |offset, seed| {
-        let film = render_gpu(&scene, &with(offset, seed));
+    let [exact, nudged] = [(Offset::Exact, 1), (Offset::None, 2)]
+        .map(|(offset, seed)| render_gpu(&scene, &with(offset, seed)));
+    let _left = Left::of("without an offset", &nudged, &exact);
+    let light = |film: &Film| {
         let count = film.rect().pixels();
         let variance = (0..count)
             .filter_map(|i| film.variance_of_mean(i))
             .flatten()
             .sum::<f64>();
         (
-            Estimate::of(&film).mean,
+            Estimate::of(film).mean,
             variance.sqrt() / (3 * count) as f64,
         )
     };
-    let (exact, exact_error) = light(Offset::Exact, 1);
-    let (nudged, nudged_error) = light(Offset::None, 2);
+    let (exact, exact_error) = light(&exact);
+    let (nudged, nudged_error) = light(&nudged);
     let removed = 1.0 - nudged / exact;
     // Channels of a pixel share their paths: at most three times the variance.
     let error = (3.0f64).sqrt() * exact_error.hypot(nudged_error) / exact;

@@ -18,6 +18,8 @@ use gpu_trace::statistics::normal_limit;
 use gpu_trace::verify::{Random, settings, share_off};
 
 use crate::cli_support::{Folder, holds};
+use crate::common::blocks::Blocks;
+use crate::common::images::{Left, assert_alike};
 use crate::common::{job, render_cpu, render_gpu, scene, scene_file};
 
 fn moving() -> Scene {
@@ -34,84 +36,56 @@ fn at(scene: &Scene, time: f64) -> Scene {
     still
 }
 
-/// Blocks of pixels a side, and pixels of a block a side.
-const BLOCKS: usize = 3;
-const SIDE: usize = 8;
-
-/// The mean of each channel in each block of pixels, and its variance.
-fn blocks(film: &Film) -> Vec<[f64; 2]> {
-    assert_eq!(film.tally().non_finite, 0);
-    let mut all = Vec::new();
-    for block in 0..BLOCKS * BLOCKS {
-        let corner = SIDE * (block / BLOCKS * BLOCKS * SIDE + block % BLOCKS);
-        let pixels = (0..SIDE * SIDE).map(|i| corner + i / SIDE * BLOCKS * SIDE + i % SIDE);
-        let pixels: Vec<usize> = pixels.collect();
-        for c in 0..3 {
-            let variance = |i: &usize| film.variance_of_mean(*i).expect("16 batches")[c];
-            let mean: f64 = pixels.iter().map(|i| film.mean(*i)[c]).sum();
-            let count = pixels.len() as f64;
-            let variance: f64 = pixels.iter().map(variance).sum();
-            all.push([mean / count, variance / (count * count)]);
-        }
-    }
-    all
-}
-
-/// The largest deviation of a block's channel from that of another image, in standard errors of both; and how many of
-/// these a change by 5 % would be in the mean.
-fn blocks_apart(a: &[[f64; 2]], b: &[[f64; 2]]) -> [f64; 2] {
-    let error = |a: &[f64; 2], b: &[f64; 2]| (a[1] + b[1]).sqrt();
-    let all = a.iter().zip(b);
-    let worst = all
-        .clone()
-        .map(|(a, b)| (a[0] - b[0]).abs() / error(a, b))
-        .fold(0.0, f64::max);
-    let power: f64 = all.map(|(a, b)| 0.05 * b[0] / error(a, b)).sum();
-    [worst, power / a.len() as f64]
-}
+/// Pixels of a side of the image, and of the blocks whose means are compared.
+const SIZE: u32 = 24;
+const BLOCK: usize = 8;
 
 /// The mean of the images at this many times, each with samples of its own.
-fn mean_of_frames(scene: &Scene, settings: &Settings, frames: u32) -> Vec<[f64; 2]> {
-    let mut mean = vec![[0.0; 2]; 3 * BLOCKS * BLOCKS];
-    for frame in 0..frames {
+fn mean_of_frames(scene: &Scene, settings: &Settings, frames: u32) -> Blocks {
+    let frame = |frame: u32| {
         let time = (f64::from(frame) + 0.5) / f64::from(frames) - 0.5;
         let settings = Settings {
             seed: u64::from(frame) + 1,
             ..settings.clone()
         };
-        let film = render_gpu(&at(scene, time), &settings);
-        for (mean, [own, variance]) in mean.iter_mut().zip(blocks(&film)) {
-            mean[0] += own / f64::from(frames);
-            mean[1] += variance / f64::from(frames).powi(2);
-        }
-    }
-    mean
+        Blocks::of(&render_gpu(&at(scene, time), &settings), BLOCK)
+    };
+    Blocks::mean_of(&(0..frames).map(frame).collect::<Vec<_>>())
 }
 
 /// Frames whose mean stands for all times. The error of so many, h²/24 times the change of the slope from end to end,
 /// is far below that of the samples for blocks of pixels.
 const FRAMES: u32 = 16;
 
-fn check_frames(scene: &Scene, settings: &Settings) {
+fn check_frames(scene_name: &str, scene: &Scene, settings: &Settings) {
     let whole = Settings {
         samples: 0..2048,
         ..settings.clone()
     };
-    let found = blocks(&render_gpu(scene, &whole));
+    let found = Blocks::of(&render_gpu(scene, &whole), BLOCK);
     let part = Settings {
         samples: 0..128,
         ..settings.clone()
     };
     let frames = mean_of_frames(scene, &part, FRAMES);
-    let [worst, power] = blocks_apart(&found, &frames);
+    let name = settings.integrator.name();
+    let _left = Left::of(format!("frames, {scene_name}, {name}"), &found, &frames);
+    let worst = |film: &Blocks| {
+        let all = film.deviations(&frames).into_iter();
+        all.fold(0.0, |worst: f64, z| worst.max(z.abs()))
+    };
     // Companion: half as far.
     let mut slower = scene.clone();
     for sphere in &mut slower.spheres {
         sphere.motion *= 0.5;
     }
-    let [wrong, _] = blocks_apart(&blocks(&render_gpu(&slower, &whole)), &frames);
-    let limit = normal_limit(found.len());
-    let name = settings.integrator.name();
+    let wrong = worst(&Blocks::of(&render_gpu(&slower, &whole), BLOCK));
+    let worst = worst(&found);
+    // How many standard errors a change by 5 % would be in the mean.
+    let pairs = std::iter::zip(&found.channels, &frames.channels);
+    let shown = pairs.map(|(a, b)| 0.05 * b[0] / (a[1] + b[1]).sqrt());
+    let power = shown.sum::<f64>() / found.channels.len() as f64;
+    let limit = normal_limit(found.channels.len());
     eprintln!(
         "{name}: {worst:.2} of {limit:.2}; 5 % would be {power:.1}; half as far is {wrong:.1}"
     );
@@ -121,8 +95,7 @@ fn check_frames(scene: &Scene, settings: &Settings) {
 }
 
 fn small(scene: &Scene) -> Settings {
-    let side = (BLOCKS * SIDE) as u32;
-    settings(scene, side, side, 64)
+    settings(scene, SIZE, SIZE, 64)
 }
 
 /// A lamp that moves over balls at rest.
@@ -139,7 +112,7 @@ const LAMP: &str = "[camera]\nposition = [0, 1, 5]\nlook_at = [0, 0.4, 0]\nfov =
 fn a_moving_lamp_is_the_mean_of_its_frames() {
     let scene = scene(LAMP);
     let base = small(&scene);
-    check_frames(&scene, &base);
+    check_frames("lamp", &scene, &base);
     for (integrator, light_sampling) in [
         (Integrator::Nee, LightSampling::Cone),
         (
@@ -156,14 +129,14 @@ fn a_moving_lamp_is_the_mean_of_its_frames() {
             light_sampling: integrator.samples_lights().then_some(light_sampling),
             ..base.clone()
         };
-        check_frames(&scene, &settings);
+        check_frames("lamp", &scene, &settings);
     }
 }
 
 #[test]
 fn whatever_moves_is_the_mean_of_its_frames() {
     let scene = moving();
-    check_frames(&scene, &small(&scene));
+    check_frames("all", &scene, &small(&scene));
 }
 
 #[test]
@@ -186,7 +159,8 @@ fn all_geometries_have_one_image() {
     for (name, other) in [("list", &list), ("bvh", &tree)] {
         let off = share_off(other, &baked);
         eprintln!("{name}: {off}");
-        assert!(off < 0.02, "{name}: {off} of the values differ");
+        let what = format!("{off} of the values differ");
+        assert_alike(&format!("motion, {name}"), other, &baked, off < 0.02, what);
     }
     assert!(share_off(&film(GeometryChoice::List, 1), &baked) > 0.02);
 }
@@ -208,6 +182,7 @@ fn images_and_layers_are_those_of_the_reference() {
     };
     let (found, wanted) = (render_gpu(&scene, &settings), render_cpu(&scene, &settings));
     let still = render_cpu(&at(&scene, 0.0), &settings);
+    let _left = Left::of("motion, reference", &found, &wanted);
     assert!(share_off(&found, &wanted) < 0.02);
     assert!(share_off(&found, &still) > 0.5);
     let [found, wanted, still] = [found, wanted, still].map(|film| sums(&film));

@@ -2,6 +2,7 @@
 
 use gpu_trace::backend::{Backend, BackendChoice};
 use gpu_trace::effects::{Effect, table};
+use gpu_trace::film::Film;
 use gpu_trace::job::{Job, prepare};
 use gpu_trace::prices::{
     Effort, Price, PriceList, Watch, alternative, forced, is_absent, measure, smaller, standard,
@@ -11,6 +12,7 @@ use gpu_trace::scene::builtin;
 use gpu_trace::settings::{Rect, Settings};
 use gpu_trace::shader::{Stage, link, link_without};
 
+use crate::common::images::assert_alike;
 use crate::thorough::thorough;
 
 /// Effects that follow from where spheres are, and one that the command asks for: nothing is in their place, and no
@@ -125,23 +127,23 @@ fn what_is_forced_links() {
     assert!(forcible > 15, "{forcible}");
 }
 
-/// The mean of each pixel of a small image.
-fn image(job: &Job) -> Vec<[f64; 3]> {
+/// A small image.
+fn image(job: &Job) -> Film {
     let mut warnings = Vec::new();
     let backend = Backend::open(&BackendChoice::default(), &mut warnings).expect("a device");
     let mut renderer = backend.renderer(job).expect("a renderer");
     let film = render_quietly(renderer.as_mut(), job.settings());
-    let film = film.expect("an image").film;
-    (0..film.rect().pixels()).map(|i| film.mean(i)).collect()
+    film.expect("an image").film
 }
 
 /// The share of the pixels of which a channel differs by more than a hundred thousandth.
-fn differing(a: &[[f64; 3]], b: &[[f64; 3]]) -> f64 {
-    let differ = |a: &[f64; 3], b: &[f64; 3]| {
+fn differing(a: &Film, b: &Film) -> f64 {
+    let differ = |i: &usize| {
+        let (a, b) = (a.mean(*i), b.mean(*i));
         (0..3).any(|c| (a[c] - b[c]).abs() > 1e-5 * a[c].abs().max(1e-3))
     };
-    let count = a.iter().zip(b).filter(|(a, b)| differ(a, b)).count();
-    count as f64 / a.len() as f64
+    let pixels = a.rect().pixels();
+    (0..pixels).filter(differ).count() as f64 / pixels as f64
 }
 
 /// A kernel of what the scene asks for and one of everything make the same image; in the long form, one of each
@@ -166,13 +168,16 @@ fn unused_effects_change_no_image() {
         if thorough()
             && let Ok(with) = forced(&own, row.effect)
         {
-            let share = differing(&expected, &image(&with));
-            assert!(share <= 0.001, "{}: {share}", row.name);
+            let film = image(&with);
+            let share = differing(&expected, &film);
+            let name = format!("with {}", row.name);
+            assert_alike(&name, &film, &expected, share <= 0.001, share);
         }
     }
     assert!(full.effects().used().count() > own.effects().used().count() + 15);
-    let share = differing(&expected, &image(&full));
-    assert!(share <= 0.001, "all of them: {share}");
+    let film = image(&full);
+    let share = differing(&expected, &film);
+    assert_alike("all effects", &film, &expected, share <= 0.001, share);
     // The companion: other samples are another image.
     let other = Settings {
         seed: 1,

@@ -18,7 +18,8 @@ use gpu_trace::shader::steps::{LOOP_ITERATIONS, vertex_steps};
 use gpu_trace::statistics::mean_and_error;
 use gpu_trace::verify::{Random, settings};
 
-use crate::common::images::{assert_alike, channels_by_batches};
+use crate::common::blocks::blocks_of_seeds;
+use crate::common::images::{Left, assert_alike, channels_by_batches};
 use crate::common::{cpu_renderer, gpu, gpu_renderer, job, scene, scene_file};
 use crate::thorough::thorough;
 
@@ -154,55 +155,7 @@ fn film_of(renderer: &mut GpuRenderer, settings: &Settings) -> Film {
 
 /// Pixels of a side of the image, and of the blocks whose means are compared.
 const SIZE: u32 = 128;
-const BLOCK: u32 = 16;
-
-/// Mean and standard error of the mean of each block, by channel, over some seeds; and at last of all together.
-fn blocks(
-    renderer: GpuRenderer,
-    settings: &Settings,
-    seeds: std::ops::Range<u64>,
-) -> Vec<[f64; 2]> {
-    let across = SIZE / BLOCK;
-    let mut found = vec![Vec::new(); (across * across * 3 + 1) as usize];
-    let mut renderer = renderer;
-    for seed in seeds {
-        renderer = renderer.with_seed(seed);
-        let film = film_of(&mut renderer, settings);
-        let mut sums = vec![0.0; found.len()];
-        for i in 0..SIZE * SIZE {
-            let block = i / SIZE / BLOCK * across + i % SIZE / BLOCK;
-            let mean = film.mean(i as usize);
-            (0..3).for_each(|c| sums[3 * block as usize + c] += mean[c]);
-        }
-        *sums.last_mut().expect("all") = sums.iter().sum();
-        found
-            .iter_mut()
-            .zip(sums)
-            .for_each(|(all, sum)| all.push(sum));
-    }
-    let summary = |values: &Vec<f64>| {
-        let (mean, error) = mean_and_error(values);
-        [mean, error]
-    };
-    found.iter().map(summary).collect()
-}
-
-/// The mean over blocks of their squared differences over the variance; of all together the difference in standard
-/// errors, and the half of its 99 % interval, relative: what a bias could be and not be seen.
-fn blocks_apart(with: &[[f64; 2]], without: &[[f64; 2]]) -> [f64; 3] {
-    let z = |([a, e], [b, f]): (&[f64; 2], &[f64; 2])| (a - b) / e.hypot(*f);
-    let mut all: Vec<f64> = std::iter::zip(with, without).map(z).collect();
-    let total = all.pop().unwrap_or_default();
-    let ([_, e], [b, f]) = (with[with.len() - 1], without[without.len() - 1]);
-    // Blocks of a lamp alone have no noise.
-    let squares: Vec<f64> = all
-        .iter()
-        .filter(|z| z.is_finite())
-        .map(|z| z * z)
-        .collect();
-    let mean = squares.iter().sum::<f64>() / squares.len() as f64;
-    [mean, total.abs(), 2.576 * e.hypot(f) / b]
-}
+const BLOCK: usize = 16;
 
 /// A small lamp close to a floor beside a wall: its spot is smaller than a cell, and what of the cell is seen from the
 /// wall depends on where.
@@ -252,9 +205,11 @@ fn it_changes_no_mean() {
             ..with.clone()
         };
         assert!(job(&scene, &with).cells().is_some(), "{name}");
-        let truth = blocks(gpu_renderer(&scene, &without), &without, seeds..2 * seeds);
-        let found = blocks(gpu_renderer(&scene, &with), &with, 0..seeds);
-        let [squares, z, unseen] = blocks_apart(&found, &truth);
+        let renderer = gpu_renderer(&scene, &without);
+        let truth = blocks_of_seeds(renderer, &without, seeds..2 * seeds, BLOCK);
+        let found = blocks_of_seeds(gpu_renderer(&scene, &with), &with, 0..seeds, BLOCK);
+        let _left = Left::of(format!("radiance cache, {name}"), &found, &truth);
+        let [squares, z, unseen] = found.apart(&truth);
         eprintln!(
             "{name}: squares of z {squares:.3}; mean: z {z:.2}, biases below {unseen:.5} are not seen"
         );
@@ -267,7 +222,8 @@ fn it_changes_no_mean() {
         let never = [("CORRECTED", -1.0)];
         let renderer = GpuRenderer::with_constants(gpu(), &job(&scene, &with), &never);
         let renderer = renderer.unwrap_or_else(|e| panic!("{e}"));
-        let [squares, z, _] = blocks_apart(&blocks(renderer, &with, 0..seeds), &truth);
+        let wrong = blocks_of_seeds(renderer, &with, 0..seeds, BLOCK);
+        let [squares, z, _] = wrong.apart(&truth);
         eprintln!("{name} without corrections: squares of z {squares:.3}; mean: z {z:.2}");
         assert!(squares > APART, "{name}: {squares}");
     }

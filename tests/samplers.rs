@@ -1,11 +1,14 @@
 //! Both samplers: the same image, true error bars, the same paths on device and host, and samples that
 //! are a function of seed, pixel and index alone.
 
-use crate::common::images::assert_alike;
+use std::iter::zip;
+
+use crate::common::images::{Left, assert_alike, assert_same, cut, with_values};
 use crate::common::{gpu_renderer, render_cpu, render_gpu, scene_file};
 use glam::DVec3;
 use gpu_trace::film::{Film, window_end};
 use gpu_trace::gpu::renderer::DispatchLimits;
+use gpu_trace::image::Picture;
 use gpu_trace::placement::Placement;
 use gpu_trace::reference::path::PathTracer;
 use gpu_trace::render::render_quietly;
@@ -13,7 +16,7 @@ use gpu_trace::sampler::Sampler;
 use gpu_trace::scene::Scene;
 use gpu_trace::settings::{Rect, Settings};
 use gpu_trace::statistics::mean_and_error;
-use gpu_trace::verify::{image_bits, means, settings};
+use gpu_trace::verify::{means, settings};
 
 const SAMPLERS: [Sampler; 2] = [Sampler::Independent, Sampler::Sobol];
 
@@ -45,25 +48,32 @@ fn gray(v: [f64; 3]) -> f64 {
 /// Renders of the same that are compared.
 const SEEDS: u64 = 24;
 
-/// What estimates of the variance of the mean are beyond the mean's actual variance, relative, in
-/// standard errors, and the ratio of both. `runs` has every pixel's mean and estimate for each seed.
-fn bars(runs: &[Vec<(DVec3, f64)>]) -> (f64, f64) {
+/// Of every pixel's mean: its variance as was estimated, and as it is over `runs`, which have every pixel's mean and
+/// estimate for each seed.
+fn variances(runs: &[Vec<(DVec3, f64)>]) -> [Vec<f64>; 2] {
     let (n, pixels) = (runs.len() as f64, runs[0].len());
-    let (mut excess, mut actual) = (Vec::new(), 0.0);
-    for i in 0..pixels {
+    let estimated = |i: usize| runs.iter().map(|run| run[i].1).sum::<f64>() / n;
+    let actual = |i: usize| {
         let mean = runs.iter().map(|run| run[i].0).sum::<DVec3>() / n;
         let squares: f64 = runs
             .iter()
             .map(|run| (run[i].0 - mean).length_squared())
             .sum();
-        let estimated = runs.iter().map(|run| run[i].1).sum::<f64>() / n;
-        let variance = squares / (n - 1.0);
-        actual += variance;
-        excess.push(estimated - variance);
-    }
+        squares / (n - 1.0)
+    };
+    [
+        (0..pixels).map(estimated).collect(),
+        (0..pixels).map(actual).collect(),
+    ]
+}
+
+/// What estimates are beyond actual variances, relative, in standard errors, and the ratio of both.
+fn bars([estimated, actual]: &[Vec<f64>; 2]) -> (f64, f64) {
+    let excess: Vec<f64> = zip(estimated, actual).map(|(a, b)| a - b).collect();
     // Pixels are independent.
     let (mean, error) = mean_and_error(&excess);
-    (mean / error, 1.0 + mean * pixels as f64 / actual)
+    let ratio = estimated.iter().sum::<f64>() / actual.iter().sum::<f64>();
+    (mean / error, ratio)
 }
 
 fn small(scene: &Scene, sampler: Sampler, spp: u64, seed: u64) -> Settings {
@@ -93,7 +103,17 @@ fn error_bars_are_true() {
                 };
                 runs.push((0..400).map(of).collect());
             }
-            let (z, ratio) = bars(&runs);
+            let both = variances(&runs);
+            let [found, wanted] = both.each_ref().map(|values| {
+                let pixels = values.iter().map(|x| [*x as f32; 3]);
+                Picture::new(20, 20, pixels.collect())
+            });
+            let _left = Left::of(
+                format!("variances, {sampler:?}, {spp} spp"),
+                &found,
+                &wanted,
+            );
+            let (z, ratio) = bars(&both);
             eprintln!("{sampler:?}, {spp} spp: ratio {ratio:.3}, z = {z:.2}");
             assert!(z.abs() < 3.9, "{sampler:?}, {spp} spp: {z}");
         }
@@ -115,7 +135,7 @@ fn companion_samples_of_a_scramble_are_not_independent() {
                 .collect()
         };
         let runs: Vec<_> = (0..SEEDS).map(run).collect();
-        let (z, ratio) = bars(&runs);
+        let (z, ratio) = bars(&variances(&runs));
         eprintln!("{sampler:?}: ratio {ratio:.3}, z = {z:.2}");
         z
     };
@@ -237,14 +257,7 @@ fn samples_are_a_function_of_seed_pixel_and_index() {
             // Dispatches end within batches.
             for (tiles, samples) in [(1, 4), (u32::MAX, 12), (2, 28)] {
                 let split = film_of(&scene, &whole, DispatchLimits { tiles, samples });
-                let same = image_bits(&film) == image_bits(&split);
-                assert_alike(
-                    &format!("{sampler:?}, split"),
-                    &split,
-                    &film,
-                    same,
-                    "other bits",
-                );
+                assert_same(format!("{sampler:?}, split"), &split, &film);
                 for i in 0..film.rect().pixels() {
                     assert_eq!(film.variance_of_mean(i), split.variance_of_mean(i));
                 }
@@ -263,6 +276,7 @@ fn samples_are_a_function_of_seed_pixel_and_index() {
                 },
                 DispatchLimits::default(),
             );
+            let _left = Left::of(format!("{sampler:?}, crop"), &part, &cut(&film, crop));
             for y in 0..11 {
                 for x in 0..9 {
                     let here = film.mean(((y + 3) * 21 + x + 5) as usize);
@@ -282,13 +296,16 @@ fn samples_are_a_function_of_seed_pixel_and_index() {
                 of(whole.samples.start..middle),
                 of(middle..whole.samples.end),
             ];
-            for i in 0..film.rect().pixels() {
-                for c in 0..3 {
-                    let sum: f64 = parts
-                        .iter()
-                        .map(|f| f.mean(i)[c] * f.samples() as f64)
-                        .sum();
-                    let mean = sum / film.samples() as f64;
+            let weight = |part: &Film| part.samples() as f64 / film.samples() as f64;
+            let mean_of = |i: usize| {
+                let sum = |c: usize| parts.iter().map(|f| f.mean(i)[c] * weight(f)).sum();
+                [0, 1, 2].map(sum)
+            };
+            let means: Vec<[f64; 3]> = (0..film.rect().pixels()).map(mean_of).collect();
+            let joined = with_values(&film, means.iter().copied());
+            let _left = Left::of(format!("{sampler:?}, parts"), &joined, &film);
+            for (i, mean) in means.iter().enumerate() {
+                for (c, mean) in mean.iter().enumerate() {
                     let off = (film.mean(i)[c] - mean).abs();
                     assert!(
                         off <= 2.0 * gpu_trace::verify::U * mean,

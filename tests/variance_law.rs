@@ -9,6 +9,7 @@
 //! pairs: 1/(1 - q) (1 + 2 rho/(1 - rho)). The other way is that L = 1 + w L', which gives
 //! E L^2 = 1 + 2 rho m + q E L^2 with m = E L = 1/(1 - rho): the same.
 
+use crate::common::images::{Left, uniform, with_values};
 use crate::common::{job, render_cpu, render_gpu, scene};
 use crate::thorough::thorough;
 use gpu_trace::film::Film;
@@ -73,14 +74,31 @@ fn the_law_has_two_derivations() {
     }
 }
 
-/// The variance of a sample, averaged over the pixels' independent estimates of it, and the standard
-/// error of that.
-fn measured(film: &Film) -> (f64, f64) {
+/// The variance of a sample, as each pixel has it by itself.
+fn variances(film: &Film) -> Vec<[f64; 3]> {
     let samples = film.samples() as f64;
-    let variances: Vec<f64> = (0..film.rect().pixels())
-        .map(|i| samples * film.variance_of_mean(i).expect("16 blocks")[0])
-        .collect();
-    mean_and_error(&variances)
+    let of = |i| {
+        film.variance_of_mean(i)
+            .expect("16 blocks")
+            .map(|v| samples * v)
+    };
+    (0..film.rect().pixels()).map(of).collect()
+}
+
+/// The same averaged over pixels, and the standard error of that.
+fn measured(film: &Film) -> (f64, f64) {
+    let red = variances(film).into_iter().map(|[red, ..]| red);
+    mean_and_error(&red.collect::<Vec<_>>())
+}
+
+/// To be left where a variance is not the law's.
+fn left(name: String, film: &Film, law: f64) -> Left {
+    let found = with_values(film, variances(film));
+    Left::of(
+        format!("variance, {name}"),
+        &found,
+        &uniform(film, [law; 3]),
+    )
 }
 
 fn lecture(p: f64) -> Integrator {
@@ -97,9 +115,10 @@ fn check(render: impl Fn(&Scene, &Settings) -> Film, side: u32, wrong: f64) {
             sampler: Sampler::Independent,
             ..settings(&scene, side, side, 256)
         };
-        let (variance, error) = measured(&render(&scene, &settings));
+        let (film, law) = (render(&scene, &settings), by_recursion(rho, p));
+        let _left = left(format!("rho {rho}, p {p}, side {side}"), &film, law);
+        let (variance, error) = measured(&film);
         let deviations = |law: f64| (variance - law) / error;
-        let law = by_recursion(rho, p);
         let z = deviations(law);
         eprintln!("rho {rho}, p {p}: {variance:.5} +- {error:.5} for {law:.5}, z = {z:.2}");
         assert!(z.abs() < limit, "rho {rho}, p {p}: {z} deviations");
@@ -148,8 +167,9 @@ fn roulette_has_its_variance() {
             sampler: Sampler::Independent,
             ..settings(&scene, 64, 64, 256)
         };
-        let (variance, error) = measured(&render_gpu(&scene, &settings));
-        let law = with_roulette(rho);
+        let (film, law) = (render_gpu(&scene, &settings), with_roulette(rho));
+        let _left = left(format!("rho {rho}, roulette"), &film, law);
+        let (variance, error) = measured(&film);
         let z = (variance - law) / error;
         eprintln!("rho {rho}: {variance:.5} +- {error:.5} for {law:.5}, z = {z:.2}");
         assert!(z.abs() < limit, "rho {rho}: {z} deviations");

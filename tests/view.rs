@@ -1,6 +1,7 @@
 //! `--view`: images of something else than light.
 
 use crate::cli_support::{Folder, GOOD, holds, mean};
+use crate::common::images::Left;
 
 const ONE: &str = "
     camera = { position = [0, 0, -5], look_at = [0, 0, 0], fov = 40 }
@@ -17,6 +18,7 @@ fn one_leaf_is_one_step_a_ray() {
     let arguments = "one.toml --geometry bvh --view bvh-cost --spp 8 -o a.npy";
     // Whether it meets the ball or not, and however bright the light is.
     let (one, _) = folder.render(&format!("{arguments} --max-bounces 0"));
+    let _left = Left::alone("one leaf", &one);
     assert!(one.pixels.iter().all(|pixel| *pixel == [1.0; 3]), "{one:?}");
     // Companion: a sample that goes on takes one for each of its rays.
     let (more, stats) = folder.render(arguments);
@@ -41,6 +43,7 @@ fn the_paths_are_those_of_the_image() {
     folder.ok(arguments);
     assert_eq!(with["rays"], folder.json("a.json")["rays"]);
     assert_ne!(cost.pixels, folder.npy("a.npy").pixels);
+    let _left = Left::alone("steps in a field", &cost);
     // The sky at the top is cheaper than the balls.
     let row = |y: usize| (0..48).map(|x| cost.pixels[y * 48 + x][0]).sum::<f32>();
     assert!(

@@ -26,8 +26,14 @@ pub fn image_bits(film: &Film) -> Vec<u32> {
 /// Share of the values of `film` that are off from the reference's by more than 0.1 %.
 #[must_use]
 pub fn share_off(film: &Film, reference: &Film) -> f64 {
+    share_beyond(film, reference, 1.0e-3)
+}
+
+/// Share of the values of `film` that are off from the reference's by more than `tolerance`, relative to these.
+#[must_use]
+pub fn share_beyond(film: &Film, reference: &Film, tolerance: f64) -> f64 {
     let (a, b) = (means(film), means(reference));
-    let near = |(x, y): &(&f64, &f64)| (*x - *y).abs() <= 1.0e-3 * y.abs();
+    let near = |(x, y): &(&f64, &f64)| (*x - *y).abs() <= tolerance * y.abs();
     1.0 - a.iter().zip(&b).filter(near).count() as f64 / a.len() as f64
 }
 
@@ -38,10 +44,15 @@ pub fn picture_of(film: &Film) -> Picture {
     Picture::new(rect.width, rect.height, film.pixels())
 }
 
-/// Leaves two images and their difference in `folder`, as NAME.of.npy and as pictures, and says so: for the
-/// message of a test that fails.
+/// Leaves an image in `folder`, as NAME.found.npy and as a picture, and says so: for the message of a test that fails.
+/// With what was wanted instead, and with their difference where that has the same size.
 #[must_use]
-pub fn leave_images(folder: &Path, name: &str, found: &Picture, wanted: &Picture) -> String {
+pub fn leave_images(
+    folder: &Path,
+    name: &str,
+    found: &Picture,
+    wanted: Option<&Picture>,
+) -> String {
     let name: String = name
         .chars()
         .map(|c| if c.is_ascii_alphanumeric() { c } else { '-' })
@@ -52,28 +63,35 @@ pub fn leave_images(folder: &Path, name: &str, found: &Picture, wanted: &Picture
     }
 }
 
-fn write_images(folder: &Path, name: &str, found: &Picture, wanted: &Picture) -> io::Result<()> {
+fn write_images(
+    folder: &Path,
+    name: &str,
+    found: &Picture,
+    wanted: Option<&Picture>,
+) -> io::Result<()> {
     std::fs::create_dir_all(folder)?;
-    let (a, b) = (found.pixels.clone(), wanted.pixels.clone());
-    let apart = |(x, y): (&[f32; 3], &[f32; 3])| [0, 1, 2].map(|c| x[c] - y[c]);
-    let difference: Vec<[f32; 3]> = a.iter().zip(&b).map(apart).collect();
-    // A picture shows its size alone, ten times as large.
-    let size = difference
-        .iter()
-        .map(|d| d.map(|x| 10.0 * x.abs()))
-        .collect();
-    let picture = |pixels: Vec<[f32; 3]>| Picture::new(found.width, found.height, pixels);
-    let of = |what: &str, ending: &str| folder.join(format!("{name}.{what}.{ending}"));
-    for (what, pixels, shown) in [
-        ("found", a.clone(), a),
-        ("wanted", b.clone(), b),
-        ("difference", difference, size),
-    ] {
-        std::fs::write(of(what, "npy"), npy::encode(&picture(pixels)))?;
-        let shown = png::encode(&picture(shown), 0.0, &Metadata::new())?;
-        std::fs::write(of(what, "png"), shown)?;
+    let write = |what: &str, picture: &Picture, shown: &Picture| {
+        let of = |ending: &str| folder.join(format!("{name}.{what}.{ending}"));
+        std::fs::write(of("npy"), npy::encode(picture))?;
+        std::fs::write(of("png"), png::encode(shown, 0.0, &Metadata::new())?)
+    };
+    write("found", found, found)?;
+    let Some(wanted) = wanted else {
+        return Ok(());
+    };
+    write("wanted", wanted, wanted)?;
+    if (found.width, found.height) != (wanted.width, wanted.height) {
+        return Ok(());
     }
-    Ok(())
+    let pairs = found.pixels.iter().zip(&wanted.pixels);
+    let apart = pairs.map(|(x, y)| [0, 1, 2].map(|c| x[c] - y[c]));
+    let difference = Picture::new(found.width, found.height, apart.collect());
+    // A picture shows its size alone, ten times as large.
+    let mut size = difference.clone();
+    for x in size.pixels.as_flattened_mut() {
+        *x = 10.0 * x.abs();
+    }
+    write("difference", &difference, &size)
 }
 
 #[cfg(test)]
@@ -88,7 +106,7 @@ mod tests {
         let film = |spp| render_in_f64(&scene, &settings(&scene, 4, 3, spp)).expect("a film");
         let (one, two) = (picture_of(&film(1)), picture_of(&film(2)));
         let folder = tempfile::tempdir().expect("a folder");
-        let said = leave_images(folder.path(), "a name, 1/2", &one, &two);
+        let said = leave_images(folder.path(), "a name, 1/2", &one, Some(&two));
         assert!(said.ends_with("a-name--1-2.*"), "{said}");
         let read = |what: &str| {
             let file = folder.path().join(format!("a-name--1-2.{what}.npy"));
@@ -98,10 +116,21 @@ mod tests {
         assert_eq!(read("wanted"), two.pixels);
         let [a, b] = [&one, &two].map(|picture| picture.pixels[0][1]);
         assert_eq!(read("difference")[0][1], a - b);
-        // And where there is no folder, it is said.
+        // One alone, and of two sizes; where there is no folder, it is said.
+        let names = |prefix: &str| {
+            let files = std::fs::read_dir(folder.path()).expect("the folder");
+            let names = files.map(|file| file.expect("a file").file_name());
+            let names = names.filter_map(|name| name.into_string().ok());
+            names.filter(|name| name.starts_with(prefix)).count()
+        };
+        let _ = leave_images(folder.path(), "alone", &one, None);
+        assert_eq!(names("alone."), 2);
+        let wider = picture_of(&render_in_f64(&scene, &settings(&scene, 5, 3, 1)).expect("a film"));
+        let _ = leave_images(folder.path(), "sizes", &one, Some(&wider));
+        assert_eq!(names("sizes."), 4);
         let file = folder.path().join("file");
         std::fs::write(&file, "").expect("a file");
-        let said = leave_images(&file, "x", &one, &two);
+        let said = leave_images(&file, "x", &one, None);
         assert!(said.contains("cannot be left"), "{said}");
     }
 }

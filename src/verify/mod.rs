@@ -13,7 +13,7 @@ mod scenes;
 
 pub use cells::{Cells, Outcome};
 pub use crowds::{Crowd, HitRow, RayRows, crowds};
-pub use images::{image_bits, leave_images, means, picture_of, share_off};
+pub use images::{image_bits, leave_images, means, picture_of, share_beyond, share_off};
 pub use measure::{Agreement, Measure};
 pub use random::Random;
 pub use renders::{reference_renderer, render_in_f64, render_on, renderer_on, settings};

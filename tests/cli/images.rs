@@ -5,6 +5,8 @@ use exr::prelude::{AttributeValue, Text};
 use serde_json::json;
 
 use crate::cli_support::{Folder, bits, holds};
+use crate::common::images::{Left, assert_same, cut};
+use gpu_trace::settings::Rect;
 
 #[test]
 fn the_default_render_is_the_lecture_beside_the_user() {
@@ -120,6 +122,7 @@ fn sample_ranges_average_to_the_whole() {
             part
         });
         assert_ne!(bits(&parts[1]), bits(&parts[2]));
+        let _left = Left::alone(format!("of ranges, {backend}"), &whole);
         for (i, whole) in whole.pixels.as_flattened().iter().enumerate() {
             let values = parts.each_ref().map(|part| part.pixels.as_flattened()[i]);
             let weights = ranges.each_ref().map(|r| (r.end - r.start) as f64 / 64.0);
@@ -142,14 +145,17 @@ fn a_crop_has_the_pixels_of_the_whole() {
     let folder = Folder::new();
     let whole = folder.render("glass --size 29x23 --spp 8").0;
     let (part, stats) = folder.render("glass --size 29x23 --spp 8 --crop 5,3,17x11");
-    assert_eq!((part.width, part.height), (17, 11));
     assert_eq!(
         (&stats["width"], &stats["height"]),
         (&json!(17), &json!(11))
     );
-    let rows = whole.pixels.chunks(29).skip(3).take(11);
-    let expected: Vec<_> = rows.flat_map(|row| &row[5..22]).copied().collect();
-    assert_eq!(part.pixels, expected);
+    let crop = Rect {
+        x: 5,
+        y: 3,
+        width: 17,
+        height: 11,
+    };
+    assert_same("a crop", &part, &cut(&whole, crop));
 }
 
 #[test]
@@ -168,9 +174,10 @@ fn the_seed_decides_the_bits() {
             seeds[i]
         );
     }
-    assert_eq!(
-        bits(&folder.render("--size 9x9 --spp 4").0),
-        images[0],
-        "0 is the default"
-    );
+    // 0 is the default.
+    let [default, zero] = ["", "--seed 0"].map(|seed| {
+        let (picture, _) = folder.render(&format!("--size 9x9 --spp 4 {seed}"));
+        picture
+    });
+    assert_same("the seed 0", &default, &zero);
 }

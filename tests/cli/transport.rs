@@ -2,7 +2,8 @@
 
 use serde_json::{Value, json};
 
-use crate::cli_support::{Folder, bits, holds, mean};
+use crate::cli_support::{Folder, holds, mean};
+use crate::common::images::{Left, assert_alike, assert_same};
 
 #[test]
 fn no_bounces_show_the_lamp_alone() {
@@ -61,6 +62,7 @@ fn the_estimators_agree() {
         }
         // The converged mean of the three channels over the whole image.
         let mean = mean(&picture);
+        let _left = Left::alone(format!("lecture {options}"), &picture);
         assert!(
             (mean / 0.8201 - 1.0).abs() < tolerance,
             "{options}: mean {mean}"
@@ -174,19 +176,17 @@ fn devices_geometries_and_threads_agree() {
         let close = pixels
             .filter(|(a, b)| (*a - *b).abs() <= 1e-3 * b.abs())
             .count();
-        assert!(
+        let (most, what) = (
             close * 100 >= 98 * 16 * 12 * 3,
-            "{options}: {close} values agree"
+            format!("{close} values agree"),
         );
+        assert_alike(options, &picture, &expected, most, what);
     }
     let threads = |n: u32| {
-        bits(
-            &folder
-                .render(&format!("{base} --backend cpu --threads {n}"))
-                .0,
-        )
+        let (picture, _) = folder.render(&format!("{base} --backend cpu --threads {n}"));
+        picture
     };
-    assert_eq!(threads(1), threads(3));
+    assert_same("one thread and three", &threads(3), &threads(1));
 }
 
 /// The radiance cache: on where there can be one, with a word where not; by choice; and parts of one image only.

@@ -1,5 +1,6 @@
 //! What the GPU tests share: a device, kernels for any set of effects, and statistics.
 
+pub(crate) mod blocks;
 pub(crate) mod images;
 
 use std::path::{Path, PathBuf};

@@ -12,7 +12,7 @@ use gpu_trace::scene::Scene;
 use gpu_trace::statistics::normal_limit;
 use gpu_trace::verify::settings;
 
-use crate::common::images::fault_of;
+use crate::common::images::assert_alike;
 use crate::common::render_gpu;
 
 /// What another renderer says of a scene.
@@ -102,9 +102,7 @@ pub(crate) fn holds(name: &str, film: &Film, other: &Independent, demand: Demand
     );
     let reference = picture(film, other);
     let what = "it differs from the reference";
-    if let Some(fault) = fault_of(name, film, &reference, verdict.passes(), what) {
-        panic!("{fault}");
-    }
+    assert_alike(name, film, &reference, verdict.passes(), what);
 }
 
 /// Fails if `film`, in which something is `wrong`, is what `other` says.

@@ -5,7 +5,8 @@ use std::fs;
 use serde_json::json;
 
 use super::limited;
-use crate::cli_support::{Folder, bits, holds};
+use crate::cli_support::{Folder, holds};
+use crate::common::images::assert_same;
 
 #[test]
 fn samples_that_are_not_finite_are_an_error_unless_allowed() {
@@ -71,7 +72,7 @@ fn a_device_that_fails_costs_no_sample_that_was_done() {
         assert!(image::open(folder.path("r.png")).is_ok());
         let part = folder.npy("r.npy");
         let whole = folder.render("--size 16x16 --spp 64").0;
-        assert_eq!(bits(&part), bits(&whole));
+        assert_same(fault, &part, &whole);
 
         // Nothing was done: what there was is better.
         let before = folder.snapshot();

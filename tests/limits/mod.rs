@@ -5,7 +5,7 @@
 mod kernels;
 mod pace;
 
-use crate::common::images::mean;
+use crate::common::images::{Left, assert_same, mean, uniform};
 use crate::common::{gpu_renderer, render_cpu, render_gpu, scene};
 use crate::thorough::thorough;
 use gpu_trace::error::Error;
@@ -68,7 +68,9 @@ fn more_bounces_than_a_loop_may_have_in_one_dispatch() {
     let mut long = settings(&scene, 2, 2, 16);
     long.max_bounces = 10_000;
     // 10001 emissions a path, 16 paths: 160016 iterations. Sums of ones are exact.
-    assert_eq!(mean(&means(&render_gpu(&scene, &long))), 10_001.0);
+    let film = render_gpu(&scene, &long);
+    let _left = Left::of("more bounces", &film, &uniform(&film, [10_001.0; 3]));
+    assert_eq!(mean(&means(&film)), 10_001.0);
 }
 
 #[test]
@@ -80,10 +82,9 @@ fn more_spheres_than_a_loop_may_visit_in_one_dispatch() {
     };
     // The same paths but for rounding at silhouettes, where some 20 of the 8192 part: a difference with a
     // standard deviation of sqrt(20) times half the radiance, 7e-4 of the sum, and four of these.
-    let (gpu, cpu) = (
-        mean(&means(&render_gpu(&scene, &many))),
-        mean(&means(&render_cpu(&scene, &many))),
-    );
+    let (film, reference) = (render_gpu(&scene, &many), render_cpu(&scene, &many));
+    let _left = Left::of("more spheres", &film, &reference);
+    let [gpu, cpu] = [film, reference].map(|film| mean(&means(&film)));
     assert!(
         (gpu / cpu - 1.0).abs() < 2.8e-3,
         "{gpu} on the GPU, {cpu} on the CPU"
@@ -97,7 +98,11 @@ fn a_path_longer_than_any_dispatch_is_an_error_or_right() {
     endless.max_bounces = 65_535;
     match render_quietly(&mut gpu_renderer(&scene, &endless), &endless) {
         // A driver without such a limit.
-        Ok(outcome) => assert_eq!(mean(&means(&outcome.film)), 65_536.0),
+        Ok(outcome) => {
+            let film = outcome.film;
+            let _left = Left::of("a long path", &film, &uniform(&film, [65_536.0; 3]));
+            assert_eq!(mean(&means(&film)), 65_536.0);
+        }
         Err(Error::Gpu(text)) => assert!(text.contains("--max-bounces"), "{text}"),
         Err(other) => panic!("{other}"),
     }
@@ -138,7 +143,11 @@ fn a_path_within_which_a_loop_ends_is_an_error_or_right() {
         let mut renderer = gpu_renderer(&scene, endless).with_seed(seed);
         match render_quietly(&mut renderer, endless) {
             // A driver without such a limit.
-            Ok(outcome) => assert_eq!(means(&outcome.film), [1001.0; 6], "seed {seed}"),
+            Ok(outcome) => {
+                let (film, wanted) = (&outcome.film, uniform(&outcome.film, [1001.0; 3]));
+                let _left = Left::of("a crowded furnace", film, &wanted);
+                assert_eq!(means(film), [1001.0; 6], "seed {seed}");
+            }
             Err(Error::Gpu(text)) => assert!(text.contains("--max-bounces"), "{text}"),
             Err(other) => panic!("{other}"),
         }
@@ -172,12 +181,13 @@ fn paths_in_a_tree_go_on_in_the_next_dispatch() {
         };
         let usual = film(None, 0);
         if whole {
+            let _left = Left::of("in a tree", &usual, &uniform(&usual, [151.0; 3]));
             assert_eq!(means(&usual), vec![151.0; 3 * 256]);
             assert_eq!(usual.tally().rays, 151 * 256 * spp);
         }
         for steps in [1, u32::MAX] {
             let other = film(Some(steps), 0);
-            assert_eq!(image_bits(&other), image_bits(&usual), "{steps}");
+            assert_same(format!("in a tree, {steps} steps"), &other, &usual);
             assert_eq!(other.tally(), usual.tally(), "{steps}");
         }
         // Companion: other samples.

@@ -1,6 +1,7 @@
 //! Large images, whose parts keep to the time and stop between one another.
 
 use super::{FURNACE, cloud};
+use crate::common::images::Left;
 use crate::common::{gpu_renderer, job, render_gpu, scene};
 use gpu_trace::error::Result;
 use gpu_trace::film::{PixelSums, Tally, Tiles, Window};
@@ -62,6 +63,7 @@ fn large_images_stop_between_their_parts() {
                 ..settings.clone()
             },
         );
+        let _left = Left::of(format!("stopped at {done}"), &outcome.film, &whole);
         assert_eq!(means(&outcome.film), means(&whole), "{samples}");
         assert_eq!(outcome.film.tally(), whole.tally(), "{samples}");
     }

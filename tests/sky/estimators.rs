@@ -2,7 +2,7 @@
 
 use super::in_sky;
 use super::light::with_sun;
-use crate::common::images::{assert_alike, bias};
+use crate::common::images::{Left, assert_alike, bias, class_image};
 use crate::common::{gpu, render_cpu, render_gpu, scene};
 use glam::DVec3;
 use gpu_trace::effects::{Effect, Effects};
@@ -155,8 +155,8 @@ const SEEDS: u64 = 12;
 #[test]
 fn layers_are_those_of_bsdf_sampling() {
     let scene = yard(2, sunny());
-    let classes = |integrator, spp| {
-        let films: Vec<Film> = (0..SEEDS)
+    let films = |integrator, spp| -> Vec<Film> {
+        (0..SEEDS)
             .map(|seed| {
                 let settings = Settings {
                     integrator,
@@ -166,23 +166,29 @@ fn layers_are_those_of_bsdf_sampling() {
                 };
                 render_gpu(&scene, &settings)
             })
-            .collect();
+            .collect()
+    };
+    let classes = |films: &[Film]| {
         let mean = |film: &Film, k: usize| {
             let pixels = film.rect().pixels();
             let of = |i: usize| film.aovs(i).expect("asked for").classes[k][1];
-            (0..pixels).map(of).sum::<f64>() / (pixels as u64 * spp) as f64
+            (0..pixels).map(of).sum::<f64>() / (pixels as u64 * film.samples()) as f64
         };
         let of = |k| mean_and_error(&films.iter().map(|film| mean(film, k)).collect::<Vec<_>>());
         (0..5).map(of).collect::<Vec<_>>()
     };
-    let reference = classes(Integrator::Bsdf, 512);
+    let truth = films(Integrator::Bsdf, 512);
+    let reference = classes(&truth);
     for integrator in [Integrator::Path, Integrator::Nee] {
-        let found = classes(integrator, 128);
+        let films = films(integrator, 128);
+        let found = classes(&films);
         for (k, (a, b)) in found.iter().zip(&reference).enumerate() {
             // Directly seen light has no variance but that of places in pixels. Ten comparisons with some 20 degrees of
             // freedom: a level of 1e-3 for all.
             let z = (a.0 - b.0) / a.1.hypot(b.1).max(1.0e-6 * b.0);
-            eprintln!("{}, class {k}: {a:?}, {b:?}, z = {z:.2}", integrator.name());
+            let name = format!("sky, {}, class {k}", integrator.name());
+            eprintln!("{name}: {a:?}, {b:?}, z = {z:.2}");
+            let _left = Left::of(name, &class_image(&films, k), &class_image(&truth, k));
             assert!(b.0 > 0.0);
             assert!(z.abs() < 4.8, "{integrator:?}, class {k}: {a:?}, {b:?}");
         }
@@ -218,6 +224,7 @@ fn what_sees_no_sky_does_not_look_for_it() {
     }
     // And the twin looks for nothing either.
     let film = render_cpu(&closed, &settings(&closed, 8, 8, 4));
+    let _left = Left::alone("a room that sees no sky", &film);
     assert_eq!(means(&film).iter().sum::<f64>(), 0.0);
 }
 

@@ -8,10 +8,10 @@ use gpu_trace::placement::Placement;
 use gpu_trace::reference::light::environment::{sky_place, sky_radiance};
 use gpu_trace::scene::{Environment, Scene, Sky};
 use gpu_trace::settings::Integrator;
-use gpu_trace::verify::{Agreement, Random, ULP, image_bits, settings, vector};
+use gpu_trace::verify::{Agreement, Random, ULP, settings, vector};
 
 use super::{ball_text, directions, in_sky, random_image, red, seen};
-use crate::common::images::assert_alike;
+use crate::common::images::{Left, assert_alike, largest_relative_difference};
 use crate::common::{probe_of, render_cpu, render_gpu, scene};
 
 /// Sizes with sides of one, of powers of two, and of neither.
@@ -196,23 +196,20 @@ fn a_constant_image_is_a_constant_environment() {
     constant.environment = Some(Environment::Constant(DVec3::splat(0.75)));
     // By BSDF sampling alone each path is the same, and so is the image, to the bit: interpolation between equal
     // numbers of few digits is exact.
-    let bits = |scene: &Scene| {
+    let by_bsdf = |scene: &Scene| {
         let settings = gpu_trace::settings::Settings {
             integrator: Integrator::Bsdf,
             ..settings(scene, 32, 32, 64)
         };
-        image_bits(&render_gpu(scene, &settings))
+        render_gpu(scene, &settings)
     };
-    let off = |a: &[u32], b: &[u32]| {
-        let pairs = a.iter().zip(b).map(|(a, b)| [*a, *b].map(f32::from_bits));
-        let off = pairs.map(|[a, b]| f64::from((a - b).abs() / b));
-        off.fold(0.0, f64::max)
-    };
+    let (film, reference) = (by_bsdf(&image), by_bsdf(&constant));
+    let _left = Left::of("a constant sky", &film, &reference);
     // mix has three roundings, and there are three of them.
-    let found = off(&bits(&image), &bits(&constant));
+    let found = largest_relative_difference(&film, &reference);
     assert!(found < 16.0 * ULP, "{found:e}");
     let other = in_sky(Sky::new("x", gray(0.7501), DVec3::ONE, 30.0), ball);
-    assert!(off(&bits(&other), &bits(&constant)) > 16.0 * ULP);
+    assert!(largest_relative_difference(&by_bsdf(&other), &reference) > 16.0 * ULP);
     // With light sampling the mean is the same, of a ball that fills the image: by a z-test that finds half a percent.
     let filled = |environment| {
         let mut scene = scene(&ball_text(DVec3::new(0.3, 0.8, -0.2).normalize(), ""));
@@ -221,10 +218,10 @@ fn a_constant_image_is_a_constant_environment() {
     };
     let (image, constant) = (filled(image.environment), filled(constant.environment));
     for integrator in [Integrator::Path, Integrator::Nee] {
-        let (a, b) = (
-            seen(&image, integrator, 1024),
-            seen(&constant, integrator, 1024),
-        );
+        let films = [&image, &constant].map(|scene| seen(scene, integrator, 1024));
+        let name = format!("a constant sky, {}", integrator.name());
+        let _left = Left::of(name, &films[0], &films[1]);
+        let [a, b] = films.each_ref().map(red);
         let z = |scale: f64| (scale * a.0 - b.0) / a.1.hypot(b.1).max(1.0e-6 * b.0);
         eprintln!("{}: {a:?}, {b:?}, z = {:.2}", integrator.name(), z(1.0));
         assert!(z(1.0).abs() < 3.9, "{integrator:?}: {a:?}, {b:?}");

@@ -1,6 +1,7 @@
 //! Light sampling of an image around all.
 
-use super::{ball_text, directions, in_sky, mean_over_cosine, random_image, seen};
+use super::{ball_text, directions, in_sky, mean_over_cosine, random_image, red, seen};
+use crate::common::images::Left;
 use crate::common::{probe_of, scene};
 use glam::DVec3;
 use gpu_trace::image::Picture;
@@ -291,7 +292,10 @@ fn a_ball_shows_the_integral_of_any_image() {
             // Of a range of 1e12 a few texels are all, and interpolation between them is what varies.
             let power = if name.contains("1e12") { 0.2 } else { 0.05 };
             for (integrator, spp) in [(Integrator::Nee, 256), (Integrator::Path, 256)] {
-                let (mean, error) = seen(&ball, integrator, spp);
+                let film = seen(&ball, integrator, spp);
+                let of_both = format!("{name}, {n}, {}", integrator.name());
+                let _left = Left::alone(of_both, &film);
+                let (mean, error) = red(&film);
                 // What the midpoint rule is off by: at the horizon, in a part of a texel.
                 let error = error.hypot(2.0e-4 * truth);
                 let z = (mean - truth) / error;

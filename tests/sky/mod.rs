@@ -18,6 +18,7 @@ use gpu_trace::settings::{Integrator, Settings};
 use gpu_trace::statistics::mean_and_error;
 use gpu_trace::verify::{Random, settings};
 
+use crate::common::images::Left;
 use crate::common::{render_gpu, scene};
 
 /// A diffuse ball of albedo .8 that fills the image and shows the normal `n` alone, to a thousandth of a radian;
@@ -33,15 +34,15 @@ fn ball_text(n: DVec3, more: &str) -> String {
     )
 }
 
-/// Mean and standard error of the red values that pixels show.
-fn seen(scene: &Scene, integrator: Integrator, spp: u64) -> (f64, f64) {
+fn seen(scene: &Scene, integrator: Integrator, spp: u64) -> Film {
     let settings = Settings {
         integrator,
         ..settings(scene, 16, 16, spp)
     };
-    red(&render_gpu(scene, &settings))
+    render_gpu(scene, &settings)
 }
 
+/// Mean and standard error of the red values that pixels show.
 fn red(film: &Film) -> (f64, f64) {
     let values: Vec<f64> = (0..film.rect().pixels()).map(|i| film.mean(i)[0]).collect();
     mean_and_error(&values)
@@ -82,7 +83,10 @@ fn shows_the_integral(
         let scene = scene(&ball_text(n, environment));
         let truth = 0.8 * mean_over_cosine(n, 1024, &radiance);
         for integrator in integrators {
-            let (mean, error) = seen(&scene, *integrator, spp);
+            let film = seen(&scene, *integrator, spp);
+            let name = format!("a ball of {n}, {}", integrator.name());
+            let _left = Left::alone(name, &film);
+            let (mean, error) = red(&film);
             // What the midpoint rule is off by where the radiance jumps, and rounding where all samples are the same.
             let error = error.hypot(2.0e-4 * truth);
             let z = |truth: f64| (mean - truth) / error;

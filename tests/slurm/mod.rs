@@ -13,7 +13,7 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use crate::cli_support::{Background, Folder, Run, holds};
-use crate::film_files::{alike, error_of, near};
+use crate::film_files::{alike, assert_near, error_of, near};
 use gpu_trace::image::Picture;
 use gpu_trace::input::read;
 use serde_json::Value;
@@ -206,7 +206,7 @@ fn parts_by_hand_are_one_render_whatever_the_names() {
             picture(&here.join(format!("{image}.npy"))),
             picture(&here.join("one.npy")),
         );
-        assert!(alike(&ours, &one));
+        assert_near(&format!("slurm, {inner}"), &ours, &one);
         let stats = |name: &str| -> Value {
             serde_json::from_slice(&fs::read(here.join(name)).expect("statistics")).expect("JSON")
         };
@@ -274,7 +274,7 @@ fn a_part_that_is_killed_or_stopped_goes_on() {
     let done = run(merge(&folder, &scripts));
     assert_eq!(done.code, Some(0), "{done:?}");
     let (whole, _) = folder.render(options);
-    assert!(alike(&folder.npy("s.npy"), &whole));
+    assert_near("slurm, after signals", &folder.npy("s.npy"), &whole);
 
     // What is done is not done again.
     let bytes = fs::read(&film).expect("the film file");

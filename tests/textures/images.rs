@@ -7,11 +7,14 @@ use gpu_trace::materials::Texture;
 use gpu_trace::scene::Scene;
 use gpu_trace::settings::{GeometryChoice, Integrator, LightSampling, Settings};
 use gpu_trace::statistics::mean_and_error;
-use gpu_trace::verify::{ULP, image_bits, means, settings, share_off};
+use gpu_trace::verify::{ULP, means, settings, share_off};
 
 use super::{albedo, emission, image, random_picture};
-use crate::common::images::{assert_alike, largest_relative_difference, mean};
-use crate::common::{render_cpu, render_gpu, scene, scene_file};
+use crate::common::blocks::{Blocks, blocks_of_seeds, deviation};
+use crate::common::images::{
+    Left, assert_alike, assert_same, largest_relative_difference, uniform, with_values,
+};
+use crate::common::{gpu_renderer, render_cpu, render_gpu, scene, scene_file};
 
 const CAMERA: &str = "[camera]\nposition = [0, 0, 4]\nlook_at = [0, 0, 0]\nfov = 40.0\n[image]\nwidth = 16\nheight = 16\n";
 
@@ -63,8 +66,7 @@ fn constant_textures_are_plain_colours() {
         let checker = textured(Texture::Checker { values, size: 0.5 });
         let name = format!("{geometry:?}");
         let found = render_gpu(&checker, &settings);
-        let same = image_bits(&found) == image_bits(&plain);
-        assert_alike(&name, &found, &plain, same, "other bits");
+        assert_same(&name, &found, &plain);
         let picture = Picture::new(5, 3, vec![color.to_array(); 15]);
         // An interpolation has three roundings, of which there are three, at each of a few events.
         let constant = textured(image(picture, DVec3::X));
@@ -99,6 +101,7 @@ fn a_checker_in_white_light_is_its_mean() {
     let scene = with_albedo(&ball(14.0, 1.0), texture);
     let film = render_gpu(&scene, &settings(&scene, 32, 32, 256));
     let (mean, truth) = (means(&film), 0.5 * (a + b));
+    let _left = Left::of("a checker", &film, &uniform(&film, truth.to_array()));
     for channel in 0..3 {
         // Pairs of pixels that are each other's mirror image.
         let pixel = |x: usize, y: usize| mean[3 * (32 * y + x) + channel];
@@ -143,8 +146,11 @@ fn the_layer_albedo_shows_the_texture() {
     };
     let (gpu, cpu) = (render_gpu(&scene, &settings), render_cpu(&scene, &settings));
     let plain = render_gpu(&ball(20.0, 1.0), &settings);
+    let albedo = |film: &Film, i: usize| film.aovs(i).expect("asked for").albedo;
+    let layer = |film| with_values(film, (0..256).map(|i| albedo(film, i)));
+    let _left = Left::of("layer albedo", &layer(&gpu), &layer(&cpu));
     for i in 0..256 {
-        let of = |film: &Film| film.aovs(i).expect("asked for").albedo;
+        let of = |film| albedo(film, i);
         for ((a, b), light) in of(&gpu).iter().zip(of(&cpu)).zip(gpu.mean(i)) {
             assert!((a - b).abs() < 1.0e-4, "{i}: {a} {b}");
             // In light of 1 it is what is seen.
@@ -176,18 +182,14 @@ fn lit_by(texture: Option<Texture>, more: &str) -> Scene {
     scene
 }
 
-/// Mean over the image and its standard error, from seeds.
-fn brightness(scene: &Scene, integrator: Integrator, light_sampling: LightSampling) -> (f64, f64) {
-    let each = (0..8).map(|seed| {
-        let settings = Settings {
-            integrator,
-            light_sampling: integrator.samples_lights().then_some(light_sampling),
-            seed,
-            ..settings(scene, 16, 16, 256)
-        };
-        mean(&means(&render_gpu(scene, &settings)))
-    });
-    mean_and_error(&each.collect::<Vec<_>>())
+/// The image and its mean, from seeds.
+fn seen(scene: &Scene, integrator: Integrator, light_sampling: LightSampling) -> Blocks {
+    let settings = Settings {
+        integrator,
+        light_sampling: integrator.samples_lights().then_some(light_sampling),
+        ..settings(scene, 16, 16, 256)
+    };
+    blocks_of_seeds(gpu_renderer(scene, &settings), &settings, 0..8, 1)
 }
 
 #[test]
@@ -206,28 +208,23 @@ fn textured_lamps_are_the_same_for_all_estimators() {
     let sky = "[environment]\nradiance = [0.1, 0.1, 0.1]\n";
     for (name, texture, more) in [("spots", spots, ""), ("checker", checker, sky)] {
         let scene = lit_by(Some(texture), more);
-        let truth = brightness(&scene, Integrator::Bsdf, LightSampling::Projected);
+        let truth = seen(&scene, Integrator::Bsdf, LightSampling::Projected);
         for (integrator, sampling) in [
             (Integrator::Nee, LightSampling::Projected),
             (Integrator::Path, LightSampling::Projected),
             (Integrator::Nee, LightSampling::Cone),
             (Integrator::Path, LightSampling::Cone),
         ] {
-            let found = brightness(&scene, integrator, sampling);
-            let z = |scale: f64| (scale * found.0 - truth.0) / found.1.hypot(truth.1);
-            eprintln!(
-                "{name}, {}, {sampling:?}: {found:?}, {truth:?}, z = {:.2}",
-                integrator.name(),
-                z(1.0)
-            );
-            assert!(
-                z(1.0).abs() < 4.5,
-                "{name}, {integrator:?}, {sampling:?}: {found:?} for {truth:?}"
-            );
-            assert!(
-                z(1.1).abs() > 4.5,
-                "a tenth is not found: {found:?}, {truth:?}"
-            );
+            let found = seen(&scene, integrator, sampling);
+            let name = format!("{name}, {}, {sampling:?}", integrator.name());
+            let _left = Left::of(&name, &found, &truth);
+            let ([mean, variance], truth) = (found.image, truth.image);
+            let z = |scale: f64| deviation([scale * mean, variance], truth);
+            // Means with their variances.
+            let both = format!("{:?} for {truth:?}", found.image);
+            eprintln!("{name}: {both}, z = {:.2}", z(1.0));
+            assert!(z(1.0).abs() < 4.5, "{name}: {both}");
+            assert!(z(1.1).abs() > 4.5, "a tenth is not found: {both}");
         }
         // Companion: a lamp that is as bright as the mean everywhere lights this floor otherwise.
         let lamp = scene
