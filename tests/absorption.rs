@@ -3,7 +3,7 @@
 use glam::DVec3;
 use gpu_trace::film::Film;
 use gpu_trace::job::prepare;
-use gpu_trace::materials::dielectric::fresnel;
+use gpu_trace::materials::fresnel::fresnel;
 use gpu_trace::reference::scene::absorption::transmittance;
 use gpu_trace::scene::Scene;
 use gpu_trace::settings::Settings;

@@ -3,6 +3,7 @@
 
 use crate::common::images::channels_by_batches;
 use crate::common::{gpu_renderer, job, scene, scene_file};
+use gpu_trace::effects::Effect;
 use gpu_trace::error::Result;
 use gpu_trace::film::{Film, window_end};
 use gpu_trace::gpu::renderer::{DispatchLimits, GpuRenderer};
@@ -18,10 +19,11 @@ use gpu_trace::verify::{image_bits, settings};
 const SPP: u64 = 512;
 /// Two pairs.
 const SEEDS: u64 = 4;
-/// z-tests of the whole family, to be well over: two for each of 25 estimators.
-const TESTS: usize = 50;
+/// z-tests of the whole family, to be well over: two for each of 26 estimators.
+const TESTS: usize = 52;
 
-/// Gray, so that a channel tells all; dark enough for the lecture's estimator to have a finite fourth moment.
+/// Gray, so that a channel tells all; dark enough for the lecture's estimator to have a finite fourth moment; with a mirror
+/// in which both lamps have images.
 fn gray() -> Scene {
     scene(
         "[camera]\nposition = [0, 1.5, 5]\nlook_at = [0, 0.6, 0]\nfov = 40.0\n[image]\nwidth = 32\n\
@@ -62,18 +64,23 @@ fn estimators(scene: &Scene) -> Vec<Settings> {
         radiance_cache: true,
         ..settings(scene, 32, 24, SPP)
     });
+    all.push(Settings {
+        lamp_images: true,
+        ..settings(scene, 32, 24, SPP)
+    });
     assert!(2 * all.len() <= TESTS, "{} estimators", all.len());
     all
 }
 
 fn name(s: &Settings) -> String {
     format!(
-        "{} {} {}{}{}",
+        "{} {} {}{}{}{}",
         s.integrator.name(),
         s.light_sampling().name(),
         s.sampler.name(),
         if s.adaptive { " adaptive" } else { "" },
         if s.radiance_cache { " cache" } else { "" },
+        if s.lamp_images { " images" } else { "" },
     )
 }
 
@@ -217,6 +224,8 @@ fn every_estimator_holds_what_it_claims() {
         let claims = job.claims();
         assert_eq!(job.variance().class, VarianceClass::Finite, "{name}");
         assert_eq!(job.cells().is_some(), settings.radiance_cache, "{name}");
+        let has_images = job.effects().has(Effect::LampImages);
+        assert_eq!(has_images, settings.lamp_images, "{name}");
         let films = films(gpu_renderer(&scene, &settings), &settings);
         // A companion: error bars of half the length.
         let (bars, halved) = (excess(&films, 1.0), excess(&films, 0.25));

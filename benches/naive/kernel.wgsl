@@ -95,7 +95,7 @@ fn trace(pixel: vec2u, sample: u32) -> vec4f {
     var direction = normalize(work.corner + place.x * work.across + place.y * work.down);
     var throughput = vec3f(1.0);
     // What refraction has taken out of the throughput: roulette must not see it.
-    var compression = 1.0;
+    var eta_scale = 1.0;
     var radiance = vec3f(0.0);
     for (var bounce = 0u; bounce <= work.max_bounces; bounce++) {
         var nearest = 1.0e30;
@@ -136,11 +136,11 @@ fn trace(pixel: vec2u, sample: u32) -> vec4f {
             } else {
                 direction = normalize(refract(direction, normal, 1.0 / eta));
                 throughput /= eta * eta;
-                compression *= eta * eta;
+                eta_scale *= eta * eta;
                 side = -1.0;
             }
         }
-        let largest = compression * max(max(throughput.x, throughput.y), throughput.z);
+        let largest = eta_scale * max(max(throughput.x, throughput.y), throughput.z);
         let survival = min(4.0 * largest, 1.0);
         if largest <= 0.0 || u.w >= survival {
             break;

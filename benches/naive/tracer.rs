@@ -78,7 +78,7 @@ fn trace(scene: &FlatScene, max_bounces: u32, nudge: f64, pixel: u32, sample: u3
     let (mut origin, mut direction) = camera_ray(scene, x, y, &mut random);
     let mut throughput = DVec3::ONE;
     // What refraction has taken out of the throughput: roulette must not see it.
-    let mut compression = 1.0;
+    let mut eta_scale = 1.0;
     let mut radiance = DVec3::ZERO;
     for _ in 0..=max_bounces {
         let mut nearest = None;
@@ -114,13 +114,13 @@ fn trace(scene: &FlatScene, max_bounces: u32, nudge: f64, pixel: u32, sample: u3
                 } else {
                     direction = direction.refract(normal, 1.0 / eta).normalize();
                     throughput /= eta * eta;
-                    compression *= eta * eta;
+                    eta_scale *= eta * eta;
                     side = -1.0;
                 }
             }
         }
         throughput *= DVec3::from(sphere.color);
-        let largest = compression * throughput.max_element();
+        let largest = eta_scale * throughput.max_element();
         let survival = (4.0 * largest).min(1.0);
         if largest <= 0.0 || random.number() >= survival {
             break;

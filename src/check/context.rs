@@ -1,7 +1,7 @@
 //! What a case works with: a device, kernels of its functions, and renders.
 
 use super::Options;
-use crate::effects::Effects;
+use crate::effects::{Effect, Effects};
 use crate::error::Result;
 use crate::film::Film;
 use crate::gpu::bsdf_probe::BsdfProbe;
@@ -40,17 +40,19 @@ impl Context {
     ///
     /// # Errors
     /// If the device fails.
-    pub fn probe(&self, effects: &[&str]) -> Result<Probe> {
+    pub fn probe(&self, effects: &[Effect]) -> Result<Probe> {
         let offset = self.options.offset;
-        let exits: &[&str] = match offset {
+        let exits: &[Effect] = match offset {
             Offset::Exact => &[],
-            Offset::Ulp => &["interior", "straddle", "ulp"],
-            Offset::None | Offset::Back(_) | Offset::Out(_) => &["interior", "straddle", "nudge"],
+            Offset::Ulp => &[Effect::Interior, Effect::Straddle, Effect::Ulp],
+            Offset::None | Offset::Back(_) | Offset::Out(_) => {
+                &[Effect::Interior, Effect::Straddle, Effect::Nudge]
+            }
         };
         let scene = self.scene(EMPTY)?;
         let settings = Settings::for_scene(&scene);
         let placement = Placement::with_offset(&scene, settings.width, settings.height, offset);
-        let effects = Effects::named(&[effects, exits, &["baked"]].concat());
+        let effects = Effects::of(&[effects, exits, &[Effect::Baked]].concat());
         Probe::new(&self.gpu, &scene, &placement, &effects)
     }
 

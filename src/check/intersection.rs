@@ -6,6 +6,7 @@ use glam::DVec3;
 
 use super::Case;
 use super::context::Context;
+use crate::effects::Effect;
 use crate::error::Result;
 use crate::reference::scene::sphere::{
     Quadratic, pole_quadratic, root_interior, root_outside, sphere_quadratic,
@@ -201,7 +202,7 @@ fn huge(context: &Context) -> Result<Measure> {
             ]
         })
         .collect();
-    let probe = context.probe(&["interior", "pole"])?;
+    let probe = context.probe(&[Effect::Interior, Effect::Pole])?;
     let outputs: Vec<[Row; 3]> = probe.call("pole_quadratic", &inputs)?;
     let mut measure = Measure::new(1.0, "of the bound");
     for ([x, d, n], [_, outside, inside]) in inputs.iter().zip(&outputs) {

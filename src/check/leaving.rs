@@ -5,7 +5,9 @@ use glam::DVec3;
 use super::Case;
 use super::context::Context;
 use super::intersection::{NO_HIT, ray, ulp};
+use crate::effects::Effect;
 use crate::error::Result;
+use crate::materials::dielectric::Dielectric;
 use crate::reference::scene::sphere::{
     pole_quadratic, root_interior, root_outside, sphere_quadratic,
 };
@@ -57,7 +59,8 @@ pub(super) fn bounce_rows(
 
 /// Paths that hit a sphere, go on and meet it again or not.
 pub(super) fn bounce(context: &Context, inputs: &[[Row; 6]]) -> Result<Vec<[Row; 3]>> {
-    let probe = context.probe(&["dielectric", "interior", "pole"])?;
+    let glass = Effect::of_material(Dielectric::smooth(1.5));
+    let probe = context.probe(&[glass, Effect::Interior, Effect::Pole])?;
     probe.call("bounce", inputs)
 }
 

@@ -7,9 +7,11 @@ use super::context::Context;
 use super::intersection::{NO_HIT, ray, ulp};
 use super::leaving::{bounce_rows, leaving, normal_at_hit};
 use crate::bvh::{Options, Tree};
-use crate::effects::Effects;
+use crate::effects::{Effect, Effects};
 use crate::error::Result;
 use crate::gpu::probe::Probe;
+use crate::materials::dielectric::Dielectric;
+use crate::materials::diffuse::Diffuse;
 use crate::placement::{Placement, Side};
 use crate::reference::scene::sphere::{root_outside, sphere_quadratic};
 use crate::verify::{
@@ -25,8 +27,14 @@ pub(super) const CASES: &[Case] = &[Case {
     run,
 }];
 
-/// The effects of the probes.
-const GLASS: [&str; 4] = ["diffuse", "interior", "dielectric", "motion"];
+/// The effects of the probes at rest.
+fn glass() -> [Effect; 3] {
+    [
+        Effect::of_material(Diffuse { albedo: DVec3::ONE }),
+        Effect::of_material(Dielectric::smooth(1.5)),
+        Effect::Interior,
+    ]
+}
 
 fn run(context: &Context) -> Result<Measure> {
     let mut measure = Measure::new(1.0, "of the bound");
@@ -81,7 +89,7 @@ fn one_by_one(context: &Context, measure: &mut Measure) -> Result<()> {
     let count = context.size(20_000, 200_000);
     let cases: Vec<(Rows, DVec3)> = (0..count).filter_map(|i| moving(&mut random, i)).collect();
     let inputs: Vec<Rows> = cases.iter().map(|(rows, _)| *rows).collect();
-    let probe = context.probe(&GLASS)?;
+    let probe = context.probe(&[&glass()[..], &[Effect::Motion]].concat())?;
     let outputs: Vec<[Row; 3]> = probe.call("bounce", &inputs)?;
     for ((rows, start), [t, offset, _]) in cases.iter().zip(&outputs) {
         let radius = f64::from(rows[3][3]);
@@ -138,7 +146,7 @@ fn one_by_one(context: &Context, measure: &mut Measure) -> Result<()> {
         inputs.iter().map(change).collect()
     };
     let together: Vec<[Row; 3]> = probe.call("bounce", &alike(|rows| rows[7]))?;
-    let still = context.probe(&GLASS[..3])?;
+    let still = context.probe(&glass())?;
     let still: Vec<[Row; 3]> = still.call("bounce", &alike(|_| [0.0; 4]))?;
     for (rows, (a, b)) in inputs.iter().zip(together.iter().zip(&still)) {
         let same = a.as_flattened().iter().zip(b.as_flattened());
@@ -196,8 +204,8 @@ fn in_crowds(context: &Context, measure: &mut Measure) -> Result<()> {
                 [from, offset, d, to_row(way, random.unit() - 0.5)]
             })
             .collect();
-        let [list, tree] = [["list"], ["bvh"]].map(|form| -> Result<Vec<HitRow>> {
-            let effects = Effects::named(&[&GLASS[..], &form].concat());
+        let [list, tree] = [Effect::List, Effect::Bvh].map(|form| -> Result<Vec<HitRow>> {
+            let effects = Effects::of(&[&glass()[..], &[Effect::Motion, form]].concat());
             let probe = Probe::new(&context.gpu, &scene, &placement, &effects)?;
             probe.call("closest_hit", &rays)
         });

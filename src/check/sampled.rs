@@ -6,6 +6,7 @@ use glam::DVec3;
 
 use super::Measure;
 use super::context::Context;
+use crate::effects::Effect;
 use crate::error::Result;
 use crate::reference::light::aim::{Aim, aim_center, aim_pole, cone_height};
 use crate::reference::light::projected::{Cap, cap_seen};
@@ -105,7 +106,12 @@ struct Seen {
 
 fn seen(context: &Context, lamps: &[Lamp], random: &mut Random) -> Result<Vec<Seen>> {
     let inputs: Vec<[Row; 4]> = lamps.iter().map(|lamp| lamp.rows(random)).collect();
-    let effects = ["baked", "emission", "lights", "projected", "pole"];
+    let effects = [
+        Effect::Emission,
+        Effect::Lights,
+        Effect::Projected,
+        Effect::Pole,
+    ];
     let probe = context.probe(&effects)?;
     let spheres: Vec<[Row; 2]> = inputs.iter().map(|[x, pole, ..]| [*x, *pole]).collect();
     let aims: Vec<[Row; 2]> = probe.call("aim_at", &spheres)?;

@@ -1,11 +1,15 @@
 //! Case 40: what a ray hits by the tree is what it hits by asking every sphere, with the kernel's own functions.
 
+use glam::DVec3;
+
 use super::Case;
 use super::context::Context;
 use crate::bvh::{Options, Tree};
-use crate::effects::Effects;
+use crate::effects::{Effect, Effects};
 use crate::error::Result;
 use crate::gpu::probe::Probe;
+use crate::materials::dielectric::Dielectric;
+use crate::materials::diffuse::Diffuse;
 use crate::placement::{Placement, Side};
 use crate::verify::{EMPTY, HitRow, Measure, Random, crowds};
 
@@ -21,10 +25,12 @@ fn run(context: &Context) -> Result<Measure> {
     let scene = context.scene(EMPTY)?;
     let mut random = Random::new("rays at crowds");
     let mut measure = Measure::new(0.0, "hits that differ");
+    let diffuse = Effect::of_material(Diffuse { albedo: DVec3::ONE });
+    let glass = Effect::of_material(Dielectric::smooth(1.5));
     // Opaque, and of glass.
     for (side, effects) in [
-        (Side::Outside, &["diffuse"][..]),
-        (Side::Tracked, &["diffuse", "interior", "dielectric"]),
+        (Side::Outside, &[diffuse][..]),
+        (Side::Tracked, &[diffuse, Effect::Interior, glass]),
     ] {
         for crowd in crowds(context.size(300, 1000)) {
             let empty = Placement::new(&scene, scene.width, scene.height);
@@ -39,8 +45,8 @@ fn run(context: &Context) -> Result<Measure> {
             }
             let count = context.size(4096, 32_768);
             let rays = crowd.rays(&mut random, count, side == Side::Tracked);
-            let [list, tree] = [["list"], ["bvh"]].map(|form| -> Result<Vec<HitRow>> {
-                let effects = Effects::named(&[effects, &form].concat());
+            let [list, tree] = [Effect::List, Effect::Bvh].map(|form| -> Result<Vec<HitRow>> {
+                let effects = Effects::of(&[effects, &[form]].concat());
                 let probe = Probe::new(&context.gpu, &scene, &placement, &effects)?;
                 probe.call("closest_hit", &rays)
             });

@@ -161,9 +161,7 @@ pub(super) fn rows() -> Vec<Row> {
         )
         .needs([Effect::Mis])
         .needs([Effect::Projected])
-        .needs(forms_that(|form| {
-            ["mirror", "dielectric"].contains(&form.name)
-        }))
+        .needs(forms_that(|form| form.imaging.is_some()))
         .excludes([
             Effect::Lecture,
             Effect::Straddle,
@@ -185,6 +183,7 @@ pub(super) fn rows() -> Vec<Row> {
         .marks([
             "light::images",
             "lamp_images",
+            "sample_imaging",
             "imaging",
             "receive_image",
             "Departure::chain",

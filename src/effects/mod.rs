@@ -5,7 +5,7 @@
 //! chosen by them.
 //!
 //! The table's rows stand where the stages are that bring them, in the order of the data flow: geometry,
-//! samples, materials, light, ends of paths.
+//! samples, materials, textures, light, ends of paths.
 
 mod asked;
 mod geometry;
@@ -16,6 +16,7 @@ mod role;
 mod row;
 mod rules;
 mod samples;
+mod shared;
 mod surfaces;
 mod table;
 mod textures;
@@ -34,6 +35,7 @@ pub use obstacle::{cache_obstacle, image_obstacle};
 pub use role::Role;
 pub use row::{Effect, Row, Why};
 pub use rules::{completed, conflict};
+pub use shared::Shared;
 pub use table::table;
 
 use asked::when;

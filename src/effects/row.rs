@@ -88,7 +88,7 @@ pub type Why = Box<dyn Fn(&Asked<'_>) -> Vec<String> + Send + Sync>;
 pub struct Row {
     /// The effect.
     pub effect: Effect,
-    /// Its name: in the scene file, in the kernel, and in every output.
+    /// Its name: in conditions of the kernel's sources, and in every output.
     pub name: &'static str,
     /// What it adds, in a few words.
     pub what: &'static str,
@@ -143,16 +143,16 @@ impl Row {
     /// type whose member it is, a module that it is in, or a few of these with `::`.
     #[must_use]
     pub fn is_marked(&self, name: &str) -> bool {
-        // Names are many and marks are some: nothing is allocated here.
-        let is_part = |mark: &str, at: usize| {
-            let (before, after) = (&name[..at], &name[at + mark.len()..]);
-            (before.is_empty() || before.ends_with("::"))
-                && (after.is_empty() || after.starts_with("::"))
-        };
-        let found = |mark: &String| {
-            let mut places = name.match_indices(mark.as_str());
-            places.any(|(at, _)| is_part(mark, at))
-        };
-        self.marks.iter().any(found)
+        self.marks.iter().any(|mark| is_marked(name, mark))
     }
+}
+
+/// Whether one mark says so. Names are many and marks are some: nothing is allocated here.
+pub(super) fn is_marked(name: &str, mark: &str) -> bool {
+    let is_part = |at: usize| {
+        let (before, after) = (&name[..at], &name[at + mark.len()..]);
+        (before.is_empty() || before.ends_with("::"))
+            && (after.is_empty() || after.starts_with("::"))
+    };
+    name.match_indices(mark).any(|(at, _)| is_part(at))
 }

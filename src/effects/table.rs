@@ -1,10 +1,10 @@
-//! The table of all effects, and those of a name or of a form of a material.
+//! The table of all effects, and those of a name or of a material.
 
 use std::sync::LazyLock;
 
 use super::row::{Effect, Row};
 use super::{geometry, light, paths, samples, surfaces, textures};
-use crate::materials::{Form, forms};
+use crate::materials::{MaterialKind, forms};
 
 /// All effects that the program has, in the order of the data flow.
 pub fn table() -> &'static [Row] {
@@ -46,10 +46,14 @@ impl Effect {
         row.map(|row| row.effect)
     }
 
-    /// That of a form of a material.
+    /// That of the form which a material has.
+    ///
+    /// # Panics
+    /// Never: every form is in the list.
     #[must_use]
-    pub fn of_form(form: &Form) -> Option<Self> {
-        let code = forms().iter().position(|f| *f == form)?;
-        Some(Self::Form(code as u32))
+    pub fn of_material(kind: impl Into<MaterialKind>) -> Self {
+        let form = kind.into().form();
+        let code = forms().iter().position(|other| *other == form);
+        Self::Form(code.expect("every form is in the list") as u32)
     }
 }

@@ -4,7 +4,7 @@ use glam::DVec3;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::dielectric::fresnel;
+use super::fresnel::fresnel;
 use super::paint::{Paint, Weights, choosable};
 use super::scattered::mean_over;
 use super::schema::MAX_MAGNITUDE;

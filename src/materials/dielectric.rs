@@ -9,11 +9,12 @@ use serde::Deserialize;
 
 pub use index::{Glass, Index, Sellmeier};
 
+use super::fresnel::fresnel;
 use super::ggx::alpha;
 use super::schema::MAX_MAGNITUDE;
 use super::{
-    Bsdf, BsdfSample, BsdfValue, Event, Form, MaterialKind, Member, MemberValue, Mistake, Surface,
-    Value, schema,
+    Bsdf, BsdfSample, BsdfValue, Event, Form, Imaging, MaterialKind, Member, MemberValue, Mistake,
+    Surface, Value, schema,
 };
 
 pub(super) const NAME: &str = "dielectric";
@@ -23,6 +24,7 @@ pub(super) const FORMS: &[Form] = &[
         what: "smooth glass: Fresnel reflection and refraction",
         delta: true,
         transmits: true,
+        imaging: Some(Imaging::Refracts),
         members: &[Member::scalar("ior")],
         ..Form::of(NAME)
     },
@@ -103,34 +105,6 @@ pub(super) fn cases() -> Vec<Dielectric> {
         ..Dielectric::smooth(1.5)
     };
     [&smooth[..], &[tinted, dispersive], &rough, &[cauchy]].concat()
-}
-
-/// Fresnel's answer for one direction.
-#[derive(Clone, Copy, Debug)]
-pub struct Fresnel {
-    /// Share of the unpolarised light that is reflected.
-    pub reflected: f64,
-    /// Cosine beyond the surface; 0 if the reflection is total.
-    pub cos_t: f64,
-}
-
-/// eta: index beyond the surface over the index before it.
-#[must_use]
-pub fn fresnel(cos_i: f64, eta: f64) -> Fresnel {
-    let square = ((eta - 1.0) * (eta + 1.0) + cos_i * cos_i) / (eta * eta);
-    if square <= 0.0 {
-        return Fresnel {
-            reflected: 1.0,
-            cos_t: 0.0,
-        };
-    }
-    let cos_t = square.sqrt();
-    let s = (cos_i - eta * cos_t) / (cos_i + eta * cos_t);
-    let p = (eta * cos_i - cos_t) / (eta * cos_i + cos_t);
-    Fresnel {
-        reflected: 0.5 * (s * s + p * p),
-        cos_t,
-    }
 }
 
 impl Dielectric {

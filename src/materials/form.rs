@@ -23,6 +23,8 @@ pub struct Form {
     /// Whether it reflects by Lambert's law and does nothing else, so that values of cells can stand for what it
     /// reflects.
     pub lambertian: bool,
+    /// How light goes by a sphere of it, where images of lamps are looked for in such spheres.
+    pub imaging: Option<Imaging>,
     /// Whether it looks at where on the sphere the point is: `Surface::offset`, which no other kernel has. The kernel asks
     /// it once a vertex, by `find_NAME(surface)`, and keeps the answer in `Surface::found`.
     pub offset: bool,
@@ -50,6 +52,7 @@ impl Form {
             transmits: false,
             relative: false,
             lambertian: false,
+            imaging: None,
             offset: false,
             members: &[],
             anchored: &[],
@@ -69,6 +72,16 @@ impl Form {
     pub const fn is_translucent(&self) -> bool {
         self.transmits && !self.delta
     }
+}
+
+/// How light goes by a sphere that scatters it in delta lobes alone: what is known of these before a path meets them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Imaging {
+    /// By one lobe, about the mirror direction, of the material's colour whatever the angle.
+    Reflects,
+    /// By that lobe and a refracted one, with the shares that [`fresnel`](super::fresnel::fresnel) says for the material's
+    /// index. `sample` takes the first where u.z is 0, unless that has no share, and the other where it is 1.
+    Refracts,
 }
 
 /// A member of the kernel's `Material`. Materials may share one, of one kind.

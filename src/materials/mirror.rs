@@ -4,13 +4,14 @@ use glam::DVec3;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::{Bsdf, BsdfSample, BsdfValue, Event, Form, MemberValue, Surface, Value};
+use super::{Bsdf, BsdfSample, BsdfValue, Event, Form, Imaging, MemberValue, Surface, Value};
 
 pub(super) const NAME: &str = "mirror";
 
 pub(super) const FORMS: &[Form] = &[Form {
     what: "perfect mirrors",
     delta: true,
+    imaging: Some(Imaging::Reflects),
     ..Form::of(NAME)
 }];
 

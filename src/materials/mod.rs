@@ -4,12 +4,16 @@
 //! scene file, its forms in the kernel, its f64 twin and its test cases; its file in `shaders/materials/`
 //! the functions of its forms. Schema, validation, hash, kernel members, kind codes, both dispatches, the
 //! rows of the effects and the tests that every material has to pass follow from the line.
+//!
+//! What a material brings beside its parameters is more: the table of `measured` and the parts of `mix` have records
+//! of their own (`src/records/`), and whatever reads, links and binds these.
 
 pub mod beckmann;
 pub mod coat;
 mod contract;
 pub mod flakes;
 mod form;
+pub mod fresnel;
 pub mod ggx;
 #[cfg(test)]
 mod hemisphere;
@@ -37,7 +41,7 @@ use measured::BrdfTable;
 use mix::Part;
 
 pub use contract::{BsdfSample, BsdfValue, Event, Surface};
-pub use form::{Form, Member, MemberKind, MemberValue};
+pub use form::{Form, Imaging, Member, MemberKind, MemberValue};
 pub use material::Material;
 pub use texturable::Texturable;
 pub use texture::{Texture, TextureImage, Textured};

@@ -1,11 +1,11 @@
-//! Images of lamps that one smooth sphere makes: by reflection on a mirror or on glass, or through glass.
+//! Images of lamps that one sphere makes: by reflection on it, or through it, as its material's form says.
 //!
 //! Part of the placement: decided once, for both renderers.
 
 use super::lights::Lights;
 use super::sphere::{PlacedSphere, Side};
-use crate::materials::MaterialKind;
-use crate::materials::dielectric::fresnel;
+use crate::materials::fresnel::fresnel;
+use crate::materials::{Imaging, luminance};
 use crate::scene::Scene;
 
 /// Images up to which each is weighed at each vertex. A limit on the work there, not tuned.
@@ -30,7 +30,7 @@ pub struct LampImage {
     pub way: Way,
     /// The lamp's sphere.
     pub lamp: usize,
-    /// Refractive index of a sphere of glass; `None` for a mirror.
+    /// Refractive index of a sphere that refracts; `None` for one that reflects alone.
     pub ior: Option<f64>,
     /// What it counts for when one is chosen, but for where the vertex is: in the mean over all directions the
     /// luminance times the solid angle that the image has at the distance of the sphere's radius.
@@ -41,16 +41,6 @@ pub struct LampImage {
 /// does to either, so that all of the lamp is outside the sphere, and all of the sphere outside the lamp, for both
 /// renderers.
 const APART: f64 = 1.0e-5;
-
-/// Whether all that a material does is to reflect like a mirror, or to reflect and refract like smooth glass: the
-/// index of that.
-fn smooth(kind: &MaterialKind) -> Option<Option<f64>> {
-    match kind {
-        MaterialKind::Mirror(_) => Some(None),
-        MaterialKind::Dielectric(_) if kind.is_delta() => Some(Some(kind.ior())),
-        _ => None,
-    }
-}
 
 /// The share of parallel light on a sphere of this index that it reflects: by the midpoint rule over the square of the
 /// impact parameter.
@@ -76,14 +66,15 @@ pub(super) fn of(
         |s: &PlacedSphere| s.pole.is_none() && matches!(s.side, Side::Outside | Side::Tracked);
     let makers = spheres.iter().enumerate().filter_map(|(i, sphere)| {
         let kind = &scene.materials[sphere.material].kind;
-        Some((i, sphere, kind, smooth(kind).filter(|_| small(sphere))?))
+        let imaging = kind.form().imaging.filter(|_| small(sphere))?;
+        Some((i, sphere, kind, imaging))
     });
     // Walls have none in any sphere.
     let lamps: Vec<_> = (lights.table.iter())
         .filter(|light| small(&spheres[light.sphere]))
         .collect();
     let mut images = Vec::new();
-    for (index, sphere, kind, ior) in makers {
+    for (index, sphere, kind, imaging) in makers {
         for light in &lamps {
             let lamp = &spheres[light.sphere];
             let distance = lamp.anchor.distance(sphere.anchor);
@@ -91,11 +82,12 @@ pub(super) fn of(
             if light.sphere == index || !apart {
                 continue;
             }
-            let ways = match ior {
-                None => vec![(Way::Reflected, crate::materials::luminance(kind.color()))],
-                Some(ior) => {
-                    let share = mean_reflected(ior);
-                    vec![(Way::Reflected, share), (Way::Through, 1.0 - share)]
+            let (ior, ways) = match imaging {
+                Imaging::Reflects => (None, vec![(Way::Reflected, luminance(kind.color()))]),
+                Imaging::Refracts => {
+                    let share = mean_reflected(kind.ior());
+                    let ways = vec![(Way::Reflected, share), (Way::Through, 1.0 - share)];
+                    (Some(kind.ior()), ways)
                 }
             };
             // Reflected evenly in all directions (for parallel light on a mirror it is just so): over 4 pi R^2 in the place

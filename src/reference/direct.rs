@@ -61,9 +61,9 @@ impl PathTracer<'_> {
     /// The share of a hit's emission that the path counts: light sampling where it came from has the rest.
     pub(super) fn share_of_emission(&self, ray: &Ray, hit: &Hit, from: Departure) -> f64 {
         let lights = &self.placement.lights;
-        let light = lights.of_sphere(hit.index);
+        let lamp = lights.of_sphere(hit.index);
         let rivals = self.samples_lamps() && from.pdf > 0.0 && !hit.inside;
-        let Some(light) = light.filter(|_| rivals) else {
+        let Some(lamp) = lamp.filter(|_| rivals) else {
             return 1.0;
         };
         let sphere = &self.placement.spheres[hit.index];
@@ -71,7 +71,7 @@ impl PathTracer<'_> {
         let pdf_per_weight =
             (!lights.from_table(self.settings.light_sampling())).then_some(from.pdf_per_weight);
         let share = self.sky().map_or(1.0, |_| 1.0 - SKY_SHARE);
-        self.share_of_hit(from.pdf, share * light_pdf(light, &aim, pdf_per_weight))
+        self.share_of_hit(from.pdf, share * light_pdf(lamp, &aim, pdf_per_weight))
     }
 
     /// A direction to a lamp or to the image.

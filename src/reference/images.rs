@@ -12,7 +12,7 @@ use super::scene::ray::{Hit, Ray, Vertex, leave, vertex_at};
 use super::scene::sphere::closest_hit;
 use super::scene::texture::{emission_at, kind_at};
 use super::state::{Chain, Path, Stage};
-use crate::materials::dielectric::fresnel;
+use crate::materials::fresnel::fresnel;
 use crate::materials::{BsdfSample, Event, MaterialKind, Surface};
 use crate::placement::images::{LampImage, Way};
 
@@ -144,7 +144,7 @@ impl PathTracer<'_> {
         }
         let ray = path.ray.clone();
         let ray = leave(ray, hit, vertex, s.wi, false, self.placement.offset);
-        let Some(light) = self.light_by(&image, ray, &mut found.rays) else {
+        let Some(radiance) = self.light_by(&image, ray, &mut found.rays) else {
             return found;
         };
         let chain = Chain {
@@ -158,7 +158,7 @@ impl PathTracer<'_> {
         let (pdf, share) = self.image_pdf(&chain, image.sphere, image.way, image.lamp);
         if pdf > 0.0 {
             let weight = mis_weight(pdf, share * f.pdf);
-            found.radiance = weight / (strengths[chosen] / total * s.pdf) * f.f_cos * light;
+            found.radiance = weight / (strengths[chosen] / total * s.pdf) * f.f_cos * radiance;
         }
         found
     }

@@ -179,17 +179,23 @@ pub(super) fn module(effects: &Effects) -> String {
         text,
         "fn sample{part}(surface: Surface, wo: vec3f, u: vec4f) -> BsdfSample {{"
     );
-    text += &dispatch(
-        "surface.material",
-        samples,
-        "return BsdfSample(surface.normal, vec3f(0.0), 0.0, 0u, 1.0);",
-    );
+    text += &dispatch("surface.material", samples, NO_SAMPLE);
     let _ = writeln!(
         text,
         "}}\nfn evaluate{part}(surface: Surface, wo: vec3f, wi: vec3f) -> BsdfValue {{"
     );
     text += &dispatch("surface.material", evaluated, NO_VALUE);
     text += "}\n";
+    if effects.has(Effect::LampImages) {
+        // A dispatch of its own: drivers run what they do not choose, and that of all has the loops of mixes in it.
+        let imaging = forms.iter().filter(|(_, form)| form.imaging.is_some());
+        let imaging = imaging.map(|(code, form)| (*code, sampled(form, lecture)));
+        let imaging = dispatch("surface.material", imaging.collect(), NO_SAMPLE);
+        let _ = writeln!(
+            text,
+            "fn sample_imaging(surface: Surface, wo: vec3f, u: vec4f) -> BsdfSample {{\n{imaging}}}"
+        );
+    }
     if effects.looks_at_offset() {
         let found = forms.iter().map(|(code, form)| (*code, found(form)));
         let found = dispatch("surface.material", found.collect(), FOUND_NOTHING);
@@ -207,6 +213,9 @@ pub(super) fn module(effects: &Effects) -> String {
     text += &predicate("is_translucent", &forms, Form::is_translucent);
     text
 }
+
+/// What `sample` says where there is no material.
+const NO_SAMPLE: &str = "return BsdfSample(surface.normal, vec3f(0.0), 0.0, 0u, 1.0);";
 
 /// What `evaluate` says of what has no value.
 const NO_VALUE: &str = "return BsdfValue(vec3f(0.0), 0.0, 0u);";

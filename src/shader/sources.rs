@@ -42,6 +42,7 @@ sources![
     "materials/beckmann",
     "materials/contract",
     "materials/flakes",
+    "materials/fresnel",
     "materials/ggx",
     "materials/lattice",
     "materials/lobes",

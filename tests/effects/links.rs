@@ -2,7 +2,7 @@
 
 use super::Set;
 use super::asking::asking_for;
-use gpu_trace::effects::{Effects, table};
+use gpu_trace::effects::{Effects, Shared, table};
 use gpu_trace::materials::ALL;
 use gpu_trace::placement::Placement;
 use gpu_trace::scene::Scene;
@@ -81,35 +81,6 @@ pub(super) fn check_probes(sets: &BTreeSet<Set>) {
     assert!(faults.is_empty(), "{}", faults.join("\n"));
 }
 
-/// Whether a name belongs to what all materials that transmit bring together.
-pub(super) fn of_media(name: &str) -> bool {
-    let own = [
-        "level_of",
-        "runs_within",
-        "TRACKED",
-        "eta_scale",
-        "INITIAL_WITHIN",
-    ];
-    let mut parts = name.split("::");
-    parts.any(|part| part == "media" || own.contains(&part))
-}
-
-/// Whether a name belongs to what all light sampling brings, of lamps and of an image.
-pub(super) fn of_light_sampling(name: &str) -> bool {
-    let own = [
-        "share_of_hit",
-        "share_of_light",
-        "receive_direct",
-        "departure",
-        "lamp_hit",
-        "lighting",
-        "is_delta",
-    ];
-    let mut parts = name.split("::");
-    let modules = ["light::direct::", "light::light::"];
-    parts.any(|part| own.contains(&part)) || modules.iter().any(|module| name.starts_with(module))
-}
-
 /// A name that is there and should not be, or the other way round.
 pub(super) fn wrong_names(names: &BTreeSet<String>, effects: &Effects) -> Option<String> {
     let used: Set = effects.used().collect();
@@ -123,13 +94,11 @@ pub(super) fn wrong_names(names: &BTreeSet<String>, effects: &Effects) -> Option
             _ => {}
         }
     }
-    let media = names.iter().find(|name| of_media(name));
-    if media.is_some() != effects.transmits() {
-        return Some(format!("transmits: {media:?}"));
-    }
-    let sampling = names.iter().find(|name| of_light_sampling(name));
-    if sampling.is_some() != effects.samples_light() {
-        return Some(format!("light sampling: {sampling:?}"));
+    for shared in Shared::ALL {
+        let found = names.iter().find(|name| shared.is_marked(name));
+        if found.is_some() != (shared.is_used)(effects) {
+            return Some(format!("{}: {found:?}", shared.what));
+        }
     }
     for material in ALL {
         let module = format!("materials::{}::", material.module);

@@ -10,7 +10,7 @@ mod state;
 
 use crate::common::{scene_file, scene_files};
 use crate::thorough::thorough;
-use gpu_trace::effects::{self, Effect, Effects, table};
+use gpu_trace::effects::{Effect, Effects, Shared, completed, table};
 use gpu_trace::materials::texturable::textured_keys;
 use gpu_trace::placement::Placement;
 use gpu_trace::settings::{GeometryChoice, Integrator, Settings};
@@ -20,9 +20,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use asking::asking_for;
-use links::{
-    Linked, check, check_probes, judged, linked, of_light_sampling, of_media, wrong_names,
-};
+use links::{Linked, check, check_probes, judged, linked, wrong_names};
 
 type Set = BTreeSet<Effect>;
 
@@ -31,19 +29,6 @@ const SAMPLED: [usize; 2] = [60, 1500];
 
 fn every() -> impl DoubleEndedIterator<Item = Effect> + Clone {
     table().iter().map(|row| row.effect)
-}
-
-/// `set` with what its effects need, and what the scenes here have: something opaque within glass and through a lens.
-/// `None` if that cannot be.
-fn completed(set: impl IntoIterator<Item = Effect>) -> Option<Set> {
-    let mut set: Set = set.into_iter().collect();
-    if [Effect::Nested, Effect::Straddle]
-        .iter()
-        .any(|e| set.contains(e))
-    {
-        set.insert(Effect::Form(0));
-    }
-    effects::completed(set)
 }
 
 /// `set` without an effect and all that need it.
@@ -242,7 +227,7 @@ fn unmarked(all: &[(Set, Arc<Linked>)]) -> BTreeMap<&str, Set> {
         // Those of a material's module are its own; the dispatch is that of what is in use, and so are the
         // members of `Material`: see records/material.rs.
         let of_material = name.starts_with("materials::") || name.starts_with("bsdf::");
-        let shared = of_media(name) || of_light_sampling(name);
+        let shared = Shared::ALL.iter().any(|shared| shared.is_marked(name));
         !effects.is_empty() && !marked && !of_material && !shared && name.contains("::")
     });
     with

@@ -3,7 +3,7 @@
 use crate::check::context::Context;
 use crate::error::Result;
 use crate::gpu::probe::Probe;
-use crate::materials::dielectric::fresnel as exact_fresnel;
+use crate::materials::fresnel::fresnel as exact_fresnel;
 use crate::verify::{Measure, Random, Row, ULP};
 
 /// Bounds of what a driver may make of the Fresnel term: the least and the largest share that is
@@ -56,7 +56,7 @@ pub(super) fn fresnel(context: &Context) -> Result<Measure> {
     let inputs: Vec<Row> = (0..context.size(50_000, 500_000))
         .map(|i| fresnel_input(&mut random, i))
         .collect();
-    let probe = context.probe(&["dielectric", "interior"])?;
+    let probe = context.probe(&[])?;
     let outputs: Vec<Row> = probe.call("fresnel", &inputs)?;
     let mut measure = Measure::new(1.0, "of the bound");
     let mut beyond = 0;

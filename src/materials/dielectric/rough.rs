@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::fresnel;
+use crate::materials::fresnel::fresnel;
 use crate::materials::ggx::{Frame, ggx_normal, ggx_pdf, ggx_weight};
 use crate::materials::{BsdfSample, BsdfValue, Event, Surface};
 

@@ -1,4 +1,4 @@
-//! Twin of `shaders/light/images.wesl`: directions to the image of a lamp that one smooth sphere makes.
+//! Twin of `shaders/light/images.wesl`: directions to the image of a lamp that one sphere makes.
 //!
 //! All in units of that sphere's radius, about the axis from the vertex to its centre. A ray that meets the sphere with the
 //! impact parameter s, at the angle theta to the axis, sin theta = s/D, and with the angle of incidence alpha = asin s,
@@ -30,7 +30,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use glam::{DVec2, DVec3};
 
-use crate::materials::dielectric::fresnel;
+use crate::materials::fresnel::fresnel;
 use crate::placement::Placement;
 use crate::placement::images::{LampImage, Way};
 use crate::sampling::directions::basis_around;
@@ -237,10 +237,10 @@ impl Sight {
     }
 
     /// The pdf in solid angle of a direction at the angle theta to the axis, by that of u and the width of the arcs.
-    fn density(&self, u: f64, pdf: f64, width: f64) -> f64 {
+    fn direction_pdf(&self, u: f64, u_pdf: f64, width: f64) -> f64 {
         let sin_t = u.sqrt() / self.distance;
         let cos_t = ((1.0 - sin_t) * (1.0 + sin_t)).sqrt();
-        pdf / width * 2.0 * cos_t * self.distance * self.distance
+        u_pdf / width * 2.0 * cos_t * self.distance * self.distance
     }
 
     /// A direction; `None` if the numbers find none.
@@ -277,7 +277,7 @@ impl Sight {
         let across = phi.cos() * self.sideways + phi.sin() * self.axis.cross(self.sideways);
         Some(ImageSample {
             wi: (cos_t * self.axis + sin_t * across).normalize(),
-            pdf: self.density(place, bins[chosen] / (total * size), width),
+            pdf: self.direction_pdf(place, bins[chosen] / (total * size), width),
         })
     }
 
@@ -298,8 +298,8 @@ impl Sight {
         if bins[own] <= 0.0 || width <= 0.0 {
             return (0.0, ring.share);
         }
-        let pdf = bins[own] / (total * (end(own + 1) - end(own)));
-        (self.density(u, pdf, width), ring.share)
+        let u_pdf = bins[own] / (total * (end(own + 1) - end(own)));
+        (self.direction_pdf(u, u_pdf, width), ring.share)
     }
 }
 

@@ -16,24 +16,24 @@ use crate::settings::LightSampling;
 pub fn light_from_table(lights: &Lights, u: [f64; 2]) -> Option<&Light> {
     let count = lights.table.len();
     let place = ((u[0] * count as f64) as usize).min(count.checked_sub(1)?);
-    let light = &lights.table[place];
-    if u[1] < light.threshold {
-        Some(light)
+    let lamp = &lights.table[place];
+    if u[1] < lamp.threshold {
+        Some(lamp)
     } else {
-        lights.table.get(light.alias)
+        lights.table.get(lamp.alias)
     }
 }
 
-/// For MIS, the pdf in solid angle with which light sampling finds a direction to `light`; `pdf_per_weight` as
+/// For MIS, the pdf in solid angle with which light sampling finds a direction to `lamp`; `pdf_per_weight` as
 /// in the kernel, `None` where lights are drawn from the table.
 #[must_use]
-pub fn light_pdf(light: &Light, aim: &Aim, pdf_per_weight: Option<f64>) -> f64 {
+pub fn light_pdf(lamp: &Light, aim: &Aim, pdf_per_weight: Option<f64>) -> f64 {
     if !aim.outside {
         return 0.0;
     }
     match pdf_per_weight {
-        Some(pdf_per_weight) => light.luminance * pdf_per_weight,
-        None => light.probability / (TAU * cone_height(aim)),
+        Some(pdf_per_weight) => lamp.luminance * pdf_per_weight,
+        None => lamp.probability / (TAU * cone_height(aim)),
     }
 }
 
@@ -75,8 +75,8 @@ pub fn sample_light(
 ) -> Option<LightSample> {
     let lights = &placement.lights;
     let place = DVec2::new(u[0], u[1]);
-    let to = |light: &Light| {
-        let target = &placement.spheres[light.sphere];
+    let to = |lamp: &Light| {
+        let target = &placement.spheres[lamp.sphere];
         aim_at(
             target,
             vertex.anchor,
@@ -88,8 +88,8 @@ pub fn sample_light(
     if !lights.from_table(sampling) {
         return weighed_light(lights, vertex, own, u, &to);
     }
-    let light = light_from_table(lights, [u[2], u[3]])?;
-    let aim = to(light);
+    let lamp = light_from_table(lights, [u[2], u[3]])?;
+    let aim = to(lamp);
     let cone = sampling == LightSampling::Cone || vertex.both_sides;
     let (direction, pdf) = if cone {
         sample_cone(&aim, place)?
@@ -101,12 +101,12 @@ pub fn sample_light(
         let (direction, extent) = sample_cap(&cap, vertex.normal, place);
         (direction, vertex.normal.dot(direction).max(0.0) / extent)
     };
-    (light.sphere != own).then(|| LightSample {
+    (lamp.sphere != own).then(|| LightSample {
         wi: direction,
-        pdf: light.probability * pdf,
-        mis_pdf: light_pdf(light, &aim, None),
+        pdf: lamp.probability * pdf,
+        mis_pdf: light_pdf(lamp, &aim, None),
         limb: limb_distance(&aim, direction),
-        sphere: light.sphere,
+        sphere: lamp.sphere,
         pdf_per_weight: 0.0,
     })
 }
@@ -122,17 +122,17 @@ fn weighed_light(
     let mut total = 0.0;
     let mut chosen = None;
     let mut v = u[2];
-    for light in &lights.table {
-        let cap = cap_seen(&to(light), vertex.normal);
+    for lamp in &lights.table {
+        let cap = cap_seen(&to(lamp), vertex.normal);
         let area = match vertex.both_sides {
             true if cap.aim.outside => TAU * cone_height(&cap.aim),
             true => 0.0,
             false => cap.area,
         };
-        let strength = if light.sphere == own {
+        let strength = if lamp.sphere == own {
             0.0
         } else {
-            light.luminance * area
+            lamp.luminance * area
         };
         total += strength;
         let share = if strength > 0.0 {
@@ -142,22 +142,22 @@ fn weighed_light(
         };
         if v < share {
             v /= share;
-            chosen = Some((light, cap, strength));
+            chosen = Some((lamp, cap, strength));
         } else {
             v = ((v - share) / (1.0 - share)).min(1.0 - f64::EPSILON);
         }
     }
-    let (light, cap, strength) = chosen?;
+    let (lamp, cap, strength) = chosen?;
     let pdf_per_weight = 1.0 / total;
     if vertex.both_sides {
         let (direction, _) = sample_cone(&cap.aim, DVec2::new(u[0], u[1]))?;
-        let pdf = light.luminance * pdf_per_weight;
+        let pdf = lamp.luminance * pdf_per_weight;
         return Some(LightSample {
             wi: direction,
             pdf,
             mis_pdf: pdf,
             limb: limb_distance(&cap.aim, direction),
-            sphere: light.sphere,
+            sphere: lamp.sphere,
             pdf_per_weight,
         });
     }
@@ -166,9 +166,9 @@ fn weighed_light(
     Some(LightSample {
         wi: direction,
         pdf: strength * pdf_per_weight * cosine / extent,
-        mis_pdf: light.luminance * pdf_per_weight * cosine,
+        mis_pdf: lamp.luminance * pdf_per_weight * cosine,
         limb: limb_distance(&cap.aim, direction),
-        sphere: light.sphere,
+        sphere: lamp.sphere,
         pdf_per_weight,
     })
 }

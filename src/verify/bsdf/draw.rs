@@ -7,7 +7,7 @@ use glam::DVec3;
 use super::Subjects;
 use crate::error::Result;
 use crate::gpu::bsdf_probe::{BsdfInput, Sampled};
-use crate::materials::dielectric::fresnel;
+use crate::materials::fresnel::fresnel;
 use crate::materials::{Event, Surface};
 use crate::sampling::directions::basis_around;
 use crate::statistics::{mean_and_error, normal_p};

@@ -15,7 +15,7 @@ use glam::DVec3;
 use crate::error::Result;
 use crate::gpu::bsdf_probe::{BsdfInput, BsdfProbe, Evaluated, Sampled};
 use crate::gpu::device::Gpu;
-use crate::materials::dielectric::fresnel;
+use crate::materials::fresnel::fresnel;
 use crate::materials::{
     ALL, BsdfSample, BsdfValue, Material, MaterialKind, Surface, Texture, Value, sample_uniform,
 };
