@@ -117,16 +117,23 @@ pub const LOOPS: [Loop; 22] = [
             lookups * (MOST_OCTAVES as usize + 1)
         },
     },
-    // Over the parts of a mix: which has the delta lobe that is drawn, or which is drawn from,
+    // Over the keys that are textures.
     Loop {
-        function: "choose_part",
-        used: |effects| effects.mixes_deltas(),
-        at_vertex: |placement, _| placement.mixed[0] + 1,
+        function: "with_textures",
+        used: |effects| effects.textured_keys().count() > 1,
+        at_vertex: |placement, effects| {
+            let parts = usize::from(effects.has_mixes()) * parts_visited(placement, effects);
+            (1 + parts) * (effects.textured_keys().count() + 1)
+        },
     },
+    // Over the parts of a mix: which has the delta lobe that is drawn, then which is drawn from,
     Loop {
         function: "choose_part",
-        used: |effects| draws_from_parts(effects),
-        at_vertex: |placement, _| placement.mixed[0] + 1,
+        used: draws_from_parts,
+        at_vertex: |placement, effects| {
+            let turns = 1 + usize::from(effects.mixes_deltas());
+            turns * placement.mixed[0] + 1
+        },
     },
     // what all say of the direction that one has drawn,
     Loop {

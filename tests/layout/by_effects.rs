@@ -1,6 +1,6 @@
 //! Structs that have the members that a kernel's effects ask for.
 
-use gpu_trace::records::layout::{LightRecord, PoleRecord, SphereRecord};
+use gpu_trace::records::layout::{LightRecord, PoleRecord};
 use gpu_trace::shader::Stage;
 
 use super::{FULL, camera, device, kernel, light, mismatch, pole, sphere};
@@ -110,10 +110,8 @@ fn the_scenes_data_agree() {
     let (members, size) = device(&kernel, "SceneData");
     let mut end = 0;
     let expected = [
-        ("spheres", "Sphere", size_of::<SphereRecord>() as u32),
         ("poles", "Pole", size_of::<PoleRecord>() as u32),
         ("attributes", "Attributes", 12),
-        ("materials", "Material", device(&kernel, "Material").1),
         ("lights", "Light", size_of::<LightRecord>() as u32),
     ];
     for ((name, offset), (member, record, stride)) in members.iter().zip(expected) {
@@ -132,7 +130,7 @@ fn the_scenes_data_agree() {
     let tree = FULL.map(|name| if name == "list" { "bvh" } else { name });
     let (members, _) = device(&self::kernel(Stage::Path, &tree), "SceneData");
     let names: Vec<&str> = members.iter().map(|(name, _)| name.as_str()).collect();
-    assert_eq!(names, ["poles", "attributes", "materials", "lights"]);
+    assert_eq!(names, ["poles", "attributes", "lights"]);
     // Without lights, poles and spheres in a list there is nothing to read.
     let baked = self::kernel(Stage::Path, &["baked", "diffuse"]);
     assert_eq!(baked.struct_members("SceneData"), None);

@@ -5,7 +5,7 @@ use gpu_trace::effects::Effects;
 use gpu_trace::materials::dielectric::Index;
 use gpu_trace::materials::{ALL, Form, Material, Member, MemberKind, MemberValue, forms};
 use gpu_trace::records::material::MaterialRecord;
-use gpu_trace::shader::{Stage, material_members};
+use gpu_trace::shader::{Stage, material_members, material_record};
 
 use super::{Layout, device, kernel};
 
@@ -114,6 +114,14 @@ fn material_agrees_for_all_forms() {
             let kernel = kernel(Stage::Path, &names);
             assert_eq!(
                 device(&kernel, "Material"),
+                by_the_rules(&members),
+                "{names:?}"
+            );
+            // Records of the texture are as long, and have each in the same place.
+            let (placed, size) = material_record(&Effects::named(&names));
+            let placed = placed.into_iter().map(|(m, at)| (m.name.to_owned(), at));
+            assert_eq!(
+                (placed.collect(), size),
                 by_the_rules(&members),
                 "{names:?}"
             );

@@ -101,10 +101,7 @@ fn few_storage_buffers_are_bound() {
             2 + usize::from(binds_scene) + usize::from(effects.has(Effect::RadianceCache)),
             "{file:?} with {names:?}"
         );
-        let reads_scene = effects.keeps_spheres()
-            || effects.has(Effect::Table)
-            || effects.has_textures()
-            || effects.has_mixes();
+        let reads_scene = effects.keeps_spheres() || effects.has(Effect::Table);
         assert_eq!(binds_scene, reads_scene, "{file:?} with {names:?}");
         most = most.max(buffers);
     }
