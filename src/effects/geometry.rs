@@ -23,6 +23,7 @@ pub(super) fn rows() -> Vec<Row> {
             .marks([
                 "FIRST_CENTERED",
                 "sphere_texels",
+                "sphere_texel",
                 "SPHERE_TEXELS",
                 "SPHERES_WIDTH",
                 "sphere_of",

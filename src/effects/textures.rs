@@ -50,7 +50,7 @@ pub(super) fn rows() -> Vec<Row> {
             "image_texel",
             "image_texels",
             "data::Image",
-            "image_of",
+            "data::image_of",
             "FIRST_IMAGE",
             "IMAGE_WIDTH",
         ]),
