@@ -62,7 +62,7 @@ impl BackendChoice<'_> {
     pub fn check(&self) -> Result<()> {
         if self.kind == Some(BackendKind::Cpu) && self.device.is_some() {
             return Err(Error::Usage(
-                "--device chooses a GPU, the backend cpu uses none".into(),
+                "--device chooses a GPU, --backend cpu uses none".into(),
             ));
         }
         Ok(())

@@ -81,7 +81,7 @@ fn a_gpu_has_a_name_only_where_one_is_used() {
         device: Some("0"),
         threads: 1,
     };
-    let refusal = "--device chooses a GPU, the backend cpu uses none";
+    let refusal = "--device chooses a GPU, --backend cpu uses none";
     refused(Backend::open(&choice, &mut Vec::new()), refusal);
     let without = BackendChoice {
         device: None,

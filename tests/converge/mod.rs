@@ -323,7 +323,7 @@ fn what_cannot_be_measured_is_refused_with_both_facts() {
         &["cpu-gpu, precision, lecture, estimators"],
     );
     refused("--spp 0", &["2^48"]);
-    refused("--device 0", &["the backend cpu uses none"]);
+    refused("--device 0", &["--backends cpu uses none"]);
     refused("--seed 18446744073709551615", &["2^64 - 1"]);
     let words = "converge good.toml --size 20x12 --backends cpu --reference good.exr -o s";
     let words: Vec<&str> = words.split_whitespace().collect();

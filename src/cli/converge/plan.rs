@@ -6,7 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::args::ConvergeArgs;
-use crate::backend::{Backend, BackendChoice, BackendKind};
+use crate::backend::{Backend, BackendKind};
 use crate::cli::choices::Wanted;
 use crate::error::{Action, Error, Result};
 use crate::input::{Input, read};
@@ -196,12 +196,11 @@ fn backends(
         _ => vec![Wanted::Auto],
     };
     let is = |kind| move |wanted: &Wanted| *wanted == Wanted::Only(kind);
-    let all_cpu = wanted.iter().all(is(BackendKind::Cpu));
-    BackendChoice {
-        kind: all_cpu.then_some(BackendKind::Cpu),
-        ..args.choice(Wanted::Auto)
+    if args.device.is_some() && wanted.iter().all(is(BackendKind::Cpu)) {
+        return Err(Error::Usage(
+            "--device chooses a GPU, --backends cpu uses none".into(),
+        ));
     }
-    .check()?;
     let mut found = Backends {
         kinds: Vec::new(),
         gpu: None,
