@@ -124,6 +124,7 @@ fn bindings_are_found_by_name() {
         "counters",
         "deviations",
         "dispatch",
+        "material_texels",
         "partials",
         "scene",
         "sum_high",
