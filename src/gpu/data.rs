@@ -1,5 +1,5 @@
-//! What the kernel reads of a scene, as it lies in its buffer: `SceneData` of `shaders/scene/data.wesl`; and the
-//! textures of the tree and the sky.
+//! What the kernel reads of a scene: records in textures, and the buffer `SceneData` (`shaders/scene/data.wesl`); the tree,
+//! the sky, images and tables.
 
 use bytemuck::Pod;
 
@@ -22,16 +22,16 @@ use crate::scene::{Environment, Scene, Sky};
 use crate::shader::{Kernel, material_record};
 
 /// Name of the buffer.
-pub(super) const SCENE: &str = "scene";
+const SCENE: &str = "scene";
 /// Names of the textures.
-pub(super) const TREE: &str = "tree";
-pub(super) const RECORDS: &str = "record_texels";
-pub(super) const SPHERES: &str = "sphere_texels";
-pub(super) const MATERIALS: &str = "material_texels";
-pub(super) const SKY: &str = "sky";
-pub(super) const SKY_TABLE: &str = "sky_table";
-pub(super) const IMAGES: &str = "image_texels";
-pub(super) const MEASURED: &str = "measured_texels";
+const TREE: &str = "tree";
+const RECORDS: &str = "record_texels";
+const SPHERES: &str = "sphere_texels";
+const MATERIALS: &str = "material_texels";
+const SKY: &str = "sky";
+const SKY_TABLE: &str = "sky_table";
+const IMAGES: &str = "image_texels";
+const MEASURED: &str = "measured_texels";
 
 /// Bytes of a texel of all of them.
 const TEXEL: usize = 16;
@@ -178,15 +178,15 @@ pub(super) fn check_tables(
 #[derive(Debug)]
 pub(super) struct SceneBytes {
     data: Option<Vec<u8>>,
-    materials: Option<Vec<u8>>,
-    spheres: Option<Vec<u8>>,
-    records: Option<Vec<u8>>,
-    tree: Option<Vec<u8>>,
-    /// With its width.
-    sky: Option<(Vec<u8>, u32)>,
-    sky_table: Option<Vec<u8>>,
-    images: Option<Vec<u8>>,
-    measured: Option<Vec<u8>>,
+    textures: Vec<Texels>,
+}
+
+/// A texture that the kernel reads: its name, its texels row by row, and its columns.
+#[derive(Debug)]
+struct Texels {
+    name: &'static str,
+    bytes: Vec<u8>,
+    width: u32,
 }
 
 impl SceneBytes {
@@ -197,34 +197,45 @@ impl SceneBytes {
         placement: &Placement,
         effects: &Effects,
     ) -> Self {
-        let texels = |effects: &Effects| {
-            let tree = effects.has(Effect::Bvh).then(|| placement.tree())?;
-            Some(bytemuck::cast_slice(&tree.texels).to_vec())
-        };
         let tables = SceneTables::new(scene, placement);
+        let mut textures = Vec::new();
+        let mut add = |name, bytes, width| textures.push(Texels { name, bytes, width });
+        if effects.keeps_spheres() {
+            let texels = materials(scene, placement, effects, &tables);
+            add(MATERIALS, texels, MATERIALS_WIDTH);
+        }
+        if effects.has(Effect::List) {
+            add(SPHERES, spheres(placement, effects), SPHERES_WIDTH);
+        }
+        if effects.has(Effect::Bvh) {
+            let texels = &placement.tree().texels;
+            add(TREE, bytemuck::cast_slice(texels).to_vec(), WIDTH);
+        }
+        if effects.has_textures() || effects.has_mixes() {
+            let texels = bytemuck::cast_slice(&tables.texels(effects)).to_vec();
+            add(RECORDS, in_rows(texels, RECORDS_WIDTH), RECORDS_WIDTH);
+        }
+        if effects.has(Effect::TextureImage) {
+            let texels = tables.textures.texels();
+            add(IMAGES, bytemuck::cast_slice(&texels).to_vec(), IMAGE_WIDTH);
+        }
+        if effects.has_tables() {
+            let texels = tables.measured.texels();
+            let bytes = bytemuck::cast_slice(&texels).to_vec();
+            add(MEASURED, bytes, MEASURED_WIDTH);
+        }
+        if let Some(sky) = sky_of(scene, effects) {
+            let (texels, width) = sky_texels(sky, placement, effects);
+            add(SKY, texels, width);
+            if effects.has(Effect::Skylight) {
+                let texels = sky_table(placement.sky_table(sky));
+                let bytes = bytemuck::cast_slice(&texels).to_vec();
+                add(SKY_TABLE, bytes, SKY_TABLE_WIDTH);
+            }
+        }
         Self {
             data: scene_data(kernel, scene, placement, effects),
-            records: (effects.has_textures() || effects.has_mixes()).then(|| {
-                let texels = bytemuck::cast_slice(&tables.texels(effects)).to_vec();
-                in_rows(texels, RECORDS_WIDTH)
-            }),
-            materials: effects
-                .keeps_spheres()
-                .then(|| materials(scene, placement, effects, &tables)),
-            spheres: effects
-                .has(Effect::List)
-                .then(|| spheres(placement, effects)),
-            measured: effects
-                .has_tables()
-                .then(|| bytemuck::cast_slice(&tables.measured.texels()).to_vec()),
-            images: effects
-                .has(Effect::TextureImage)
-                .then(|| bytemuck::cast_slice(&tables.textures.texels()).to_vec()),
-            tree: texels(effects),
-            sky: sky_of(scene, effects).map(|sky| sky_texels(sky, placement, effects)),
-            sky_table: sky_of(scene, effects)
-                .filter(|_| effects.has(Effect::Skylight))
-                .map(|sky| bytemuck::cast_slice(&sky_table(placement.sky_table(sky))).to_vec()),
+            textures,
         }
     }
 
@@ -233,33 +244,8 @@ impl SceneBytes {
         if let Some(data) = self.data.as_ref().filter(|_| pass.binds(SCENE)) {
             recording.upload(SCENE, data);
         }
-        let materials = self.materials.as_ref();
-        if let Some(materials) = materials.filter(|_| pass.binds(MATERIALS)) {
-            recording.upload_texels(MATERIALS, materials, MATERIALS_WIDTH);
-        }
-        let spheres = self.spheres.as_ref();
-        if let Some(spheres) = spheres.filter(|_| pass.binds(SPHERES)) {
-            recording.upload_texels(SPHERES, spheres, SPHERES_WIDTH);
-        }
-        let records = self.records.as_ref();
-        if let Some(records) = records.filter(|_| pass.binds(RECORDS)) {
-            recording.upload_texels(RECORDS, records, RECORDS_WIDTH);
-        }
-        if let Some(tree) = self.tree.as_ref().filter(|_| pass.binds(TREE)) {
-            recording.upload_texels(TREE, tree, WIDTH);
-        }
-        if let Some((sky, width)) = self.sky.as_ref().filter(|_| pass.binds(SKY)) {
-            recording.upload_texels(SKY, sky, *width);
-        }
-        let table = self.sky_table.as_ref();
-        if let Some(table) = table.filter(|_| pass.binds(SKY_TABLE)) {
-            recording.upload_texels(SKY_TABLE, table, SKY_TABLE_WIDTH);
-        }
-        if let Some(images) = self.images.as_ref().filter(|_| pass.binds(IMAGES)) {
-            recording.upload_texels(IMAGES, images, IMAGE_WIDTH);
-        }
-        if let Some(tables) = self.measured.as_ref().filter(|_| pass.binds(MEASURED)) {
-            recording.upload_texels(MEASURED, tables, MEASURED_WIDTH);
+        for texture in self.textures.iter().filter(|t| pass.binds(t.name)) {
+            recording.upload_texels(texture.name, &texture.bytes, texture.width);
         }
     }
 }

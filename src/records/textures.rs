@@ -17,7 +17,7 @@ use crate::scene::Scene;
 /// Columns of the texture `image_texels` of `shaders/scene/texture.wesl`.
 pub const IMAGE_WIDTH: u32 = 4096;
 
-/// `Pattern`. Without pole frames the kernel's struct ends before what is for them.
+/// `Pattern`. Without pole frames a record ends before what is for them.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 #[expect(missing_docs, reason = "the members are those of the kernel's struct")]

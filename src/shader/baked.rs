@@ -223,10 +223,10 @@ fn material_of(text: &mut String, scene: &Scene, placement: &Placement, effects:
     let records: Vec<MaterialRecord> = spheres
         .map(|i| tables.of_sphere(i, scene, placement))
         .collect();
-    material_in(text, "material_of", &records, effects);
+    choose_material(text, "material_of", &records, effects);
     if effects.has_mixes() {
         let parts: Vec<MaterialRecord> = tables.mixes.materials().cloned().collect();
-        material_in(text, "material_of_part", &parts, effects);
+        choose_material(text, "material_of_part", &parts, effects);
     }
     if effects.transmits() {
         let levels: Vec<String> = placement
@@ -240,8 +240,8 @@ fn material_of(text: &mut String, scene: &Scene, placement: &Placement, effects:
     }
 }
 
-/// The function `name` that finds one of `records`.
-fn material_in(text: &mut String, name: &str, records: &[MaterialRecord], effects: &Effects) {
+/// The function `name`, which chooses one of `records`.
+fn choose_material(text: &mut String, name: &str, records: &[MaterialRecord], effects: &Effects) {
     // Writing to a String cannot fail.
     let _ = writeln!(
         text,
