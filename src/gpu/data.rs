@@ -11,8 +11,8 @@ use crate::image::Picture;
 use crate::placement::Placement;
 use crate::placement::containment::MOST_CORES;
 use crate::records::layout::{
-    ChartRecord, LightRecord, PoleRecord, SKY_TABLE_WIDTH, SPHERES_WIDTH, SphereRecord,
-    light_weight, sky_table,
+    ATTRIBUTES_WIDTH, ChartRecord, LightRecord, PoleRecord, SKY_TABLE_WIDTH, SPHERES_WIDTH,
+    SphereRecord, light_weight, sky_table,
 };
 use crate::records::material::anchored_spheres;
 use crate::records::measured::{MEASURED_WIDTH, MeasuredTables};
@@ -27,6 +27,7 @@ const SCENE: &str = "scene";
 const TREE: &str = "tree";
 const RECORDS: &str = "record_texels";
 const SPHERES: &str = "sphere_texels";
+const ATTRIBUTES: &str = "attribute_texels";
 const MATERIALS: &str = "material_texels";
 const SKY: &str = "sky";
 const SKY_TABLE: &str = "sky_table";
@@ -102,7 +103,7 @@ fn check_rows(limits: &wgpu::Limits, what: &str, width: u32, rows: u64) -> Resul
     Ok(())
 }
 
-/// Whether the device takes the spheres of a loop over all.
+/// Whether the device takes what is known of each sphere, and the spheres of a loop over all.
 ///
 /// # Errors
 /// [`Error::DeviceLimit`] if there are too many.
@@ -111,9 +112,26 @@ pub(super) fn check_spheres(
     placement: &Placement,
     effects: &Effects,
 ) -> Result<()> {
-    let texels = placement.spheres.len() * sphere_texels(effects);
-    let rows = (texels as u64).div_ceil(SPHERES_WIDTH.into());
-    check_rows(limits, "spheres", SPHERES_WIDTH, rows)
+    let rows = |texels: usize, width: u32| {
+        let all = placement.spheres.len() * texels;
+        (all as u64).div_ceil(width.into())
+    };
+    let attributes = rows(attribute_texels(effects), ATTRIBUTES_WIDTH);
+    check_rows(
+        limits,
+        "attributes of spheres",
+        ATTRIBUTES_WIDTH,
+        attributes,
+    )?;
+    match effects.has(Effect::List) {
+        true => check_rows(
+            limits,
+            "spheres",
+            SPHERES_WIDTH,
+            rows(sphere_texels(effects), SPHERES_WIDTH),
+        ),
+        false => Ok(()),
+    }
 }
 
 /// Whether the device takes the records of materials.
@@ -203,6 +221,8 @@ impl SceneBytes {
         if effects.keeps_spheres() {
             let texels = materials(scene, placement, effects, &tables);
             add(MATERIALS, texels, MATERIALS_WIDTH);
+            let texels = attributes(scene, placement, effects);
+            add(ATTRIBUTES, texels, ATTRIBUTES_WIDTH);
         }
         if effects.has(Effect::List) {
             add(SPHERES, spheres(placement, effects), SPHERES_WIDTH);
@@ -234,7 +254,7 @@ impl SceneBytes {
             }
         }
         Self {
-            data: scene_data(kernel, scene, placement, effects),
+            data: scene_data(kernel, placement, effects),
             textures,
         }
     }
@@ -281,19 +301,13 @@ fn table_rows(width: u32, height: u32) -> u64 {
 }
 
 /// The bytes that `kernel` reads; `None` if it reads nothing of the scene.
-fn scene_data(
-    kernel: &Kernel,
-    scene: &Scene,
-    placement: &Placement,
-    effects: &Effects,
-) -> Option<Vec<u8>> {
+fn scene_data(kernel: &Kernel, placement: &Placement, effects: &Effects) -> Option<Vec<u8>> {
     let (members, size) = kernel.struct_members("SceneData")?;
     let mut bytes = vec![0; size as usize];
     let ends = members.iter().skip(1).map(|(_, offset)| *offset);
     for ((name, offset), end) in members.iter().zip(ends.chain([size])) {
         let array = match name.as_str() {
             "poles" => poles(kernel, placement),
-            "attributes" => attributes(scene, placement, effects),
             "charts" => charts(placement),
             "lights" => lights(kernel, placement, effects),
             other => unreachable!("no scene data {other}"),
@@ -345,36 +359,47 @@ fn poles(kernel: &Kernel, placement: &Placement) -> Vec<u8> {
     starts_of(kernel, "Pole", records)
 }
 
+/// The texture `attribute_texels`: records of `attributes_of` in `shaders/scene/data.wesl`.
 fn attributes(scene: &Scene, placement: &Placement, effects: &Effects) -> Vec<u8> {
-    let mut words: Vec<u32> = Vec::new();
+    let texels = attribute_texels(effects);
     let mut anchored = anchored_spheres(scene, placement)
         .zip(scene.materials.len()..)
         .peekable();
-    for (index, sphere) in placement.spheres.iter().enumerate() {
-        let own = anchored.next_if(|(i, _)| *i == index);
-        words.push(own.map_or(sphere.material, |(_, record)| record) as u32);
-        if effects.has(Effect::Interior) {
-            words.push(sphere.side as u32);
-        }
-        if effects.has(Effect::Priority) {
-            words.push(sphere.level);
-        }
-        if effects.has(Effect::Nested) {
-            let core = |i: usize| sphere.cores.get(i).copied();
-            let cores = (0..MOST_CORES).map(core);
-            for other in std::iter::once(sphere.container).chain(cores) {
-                words.push(other.map_or(u32::MAX, |i| i as u32));
-            }
-        }
-        if effects.has(Effect::Lights) {
-            words.push((light_weight(index, placement, effects) as f32).to_bits());
-        }
-        if effects.has(Effect::Bvh) {
-            let centered = index.checked_sub(placement.poles);
-            words.push(centered.map_or(0, |i| placement.tree().places[i]));
-        }
+    let number = |sphere: Option<usize>| sphere.map_or(u32::MAX, |i| i as u32);
+    let records = placement
+        .spheres
+        .iter()
+        .enumerate()
+        .flat_map(|(i, sphere)| {
+            let own = anchored.next_if(|(own, _)| *own == i);
+            let material = own.map_or(sphere.material, |(_, record)| record) as u32;
+            let place = match i.checked_sub(placement.poles) {
+                Some(centered) if effects.has(Effect::Bvh) => placement.tree().places[centered],
+                _ => 0,
+            };
+            let light = match effects.has(Effect::Lights) {
+                true => (light_weight(i, placement, effects) as f32).to_bits(),
+                false => 0,
+            };
+            let cores: [u32; MOST_CORES] =
+                std::array::from_fn(|n| number(sphere.cores.get(n).copied()));
+            let record = [
+                [material, sphere.side as u32, place, light],
+                [sphere.level, number(sphere.container), 0, 0],
+                cores,
+            ];
+            record.into_iter().take(texels)
+        });
+    in_rows(bytes_of(records), ATTRIBUTES_WIDTH)
+}
+
+/// Texels of such a record: the last ones are for dielectrics that touch, and for spheres just within these.
+fn attribute_texels(effects: &Effects) -> usize {
+    match (effects.has(Effect::Nested), effects.has(Effect::Priority)) {
+        (true, _) => 3,
+        (false, true) => 2,
+        (false, false) => 1,
     }
-    bytes_of(words.into_iter())
 }
 
 fn charts(placement: &Placement) -> Vec<u8> {

@@ -95,10 +95,8 @@ impl GpuRenderer {
         );
         let partials = u64::from(width) * u64::from(height) * u64::from(partial_size);
         data::check(&gpu.limits, &kernel, partials)?;
-        if effects.has(Effect::List) {
-            data::check_spheres(&gpu.limits, placement, effects)?;
-        }
         if effects.keeps_spheres() {
+            data::check_spheres(&gpu.limits, placement, effects)?;
             data::check_materials(&gpu.limits, scene, placement, effects)?;
         }
         if effects.has(Effect::Bvh) {

@@ -1,8 +1,7 @@
 //! The structs that host and kernel share, in the kernel's layout.
 //!
 //! Structs of fixed layout are `bytemuck` structs; a test compares their offsets with naga's.
-//! `Material` and `Attributes` lose the members that no effect in use needs: the former ([`material`](super::material)) is
-//! written member by member at the offsets that naga reports, the latter, of words alone, in their order (`gpu/data.rs`).
+//! `Material` loses the members that no effect in use needs, and its records with it ([`material`](super::material)).
 
 use std::mem::offset_of;
 
@@ -152,6 +151,9 @@ impl LightRecord {
 
 /// Columns of the texture `sky_table` of `shaders/light/skylight.wesl`.
 pub const SKY_TABLE_WIDTH: u32 = 4096;
+
+/// Columns of the texture `attribute_texels` of `shaders/scene/data.wesl`.
+pub const ATTRIBUTES_WIDTH: u32 = 4096;
 
 /// Columns of the texture `sphere_texels` of `shaders/scene/data.wesl`.
 pub const SPHERES_WIDTH: u32 = 1024;

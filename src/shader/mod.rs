@@ -24,7 +24,7 @@ use crate::effects::{Effect, Effects, Role};
 use crate::error::{Error, Result};
 use crate::materials;
 use crate::placement::{Medium, Placement};
-use crate::records::layout::{CELLS_WIDTH, SKY_TABLE_WIDTH, SPHERES_WIDTH};
+use crate::records::layout::{ATTRIBUTES_WIDTH, CELLS_WIDTH, SKY_TABLE_WIDTH, SPHERES_WIDTH};
 use crate::records::material::anchored_spheres;
 use crate::records::measured::MEASURED_WIDTH;
 use crate::records::tables::{MATERIALS_WIDTH, RECORDS_WIDTH, SceneTables};
@@ -303,7 +303,9 @@ fn config(scene: &Scene, placement: &Placement, effects: &Effects) -> String {
     if effects.keeps_spheres() {
         text += &format!("const SPHERE_COUNT: u32 = {}u;\n", placement.spheres.len());
         let records = scene.materials.len() + anchored_spheres(scene, placement).count();
-        text += &format!("const MATERIALS_WIDTH: u32 = {MATERIALS_WIDTH}u;\n");
+        text += &format!(
+            "const MATERIALS_WIDTH: u32 = {MATERIALS_WIDTH}u;\nconst ATTRIBUTES_WIDTH: u32 = {ATTRIBUTES_WIDTH}u;\n"
+        );
         if effects.has_mixes() {
             text += &format!("const PART_MATERIALS: u32 = {records}u;\n");
         }

@@ -82,27 +82,6 @@ fn a_light_is_written_with_the_members_that_the_kernel_has() {
     }
 }
 
-#[test]
-fn attributes_agree() {
-    for (names, expected) in [
-        (&["list", "diffuse"][..], vec![("material", 0)]),
-        (
-            &["list", "diffuse", "interior"],
-            vec![("material", 0), ("side", 4)],
-        ),
-        (
-            &["bvh", "diffuse", "interior"],
-            vec![("material", 0), ("side", 4), ("place", 8)],
-        ),
-    ] {
-        let (members, size) = device(&kernel(Stage::Path, names), "Attributes");
-        let members: Vec<(&str, u32)> = members.iter().map(|(n, o)| (n.as_str(), *o)).collect();
-        assert_eq!(members, expected);
-        // The renderer writes words without padding.
-        assert_eq!(size as usize, 4 * expected.len());
-    }
-}
-
 /// Each array has room for exactly what the host writes: an empty scene has one of each.
 #[test]
 fn the_scenes_data_agree() {
@@ -111,7 +90,6 @@ fn the_scenes_data_agree() {
     let mut end = 0;
     let expected = [
         ("poles", "Pole", size_of::<PoleRecord>() as u32),
-        ("attributes", "Attributes", 12),
         ("lights", "Light", size_of::<LightRecord>() as u32),
     ];
     for ((name, offset), (member, record, stride)) in members.iter().zip(expected) {
@@ -130,7 +108,7 @@ fn the_scenes_data_agree() {
     let tree = FULL.map(|name| if name == "list" { "bvh" } else { name });
     let (members, _) = device(&self::kernel(Stage::Path, &tree), "SceneData");
     let names: Vec<&str> = members.iter().map(|(name, _)| name.as_str()).collect();
-    assert_eq!(names, ["poles", "attributes", "lights"]);
+    assert_eq!(names, ["poles", "lights"]);
     // Without lights, poles and spheres in a list there is nothing to read.
     let baked = self::kernel(Stage::Path, &["baked", "diffuse"]);
     assert_eq!(baked.struct_members("SceneData"), None);

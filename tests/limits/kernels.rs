@@ -101,7 +101,10 @@ fn few_storage_buffers_are_bound() {
             2 + usize::from(binds_scene) + usize::from(effects.has(Effect::RadianceCache)),
             "{file:?} with {names:?}"
         );
-        let reads_scene = effects.keeps_spheres() || effects.has(Effect::Table);
+        let keeps = effects.keeps_spheres();
+        let per_sphere = keeps && (effects.has(Effect::Pole) || effects.has(Effect::RadianceCache));
+        let lamps = effects.has(Effect::Lights) && (keeps || effects.has(Effect::Table));
+        let reads_scene = per_sphere || lamps;
         assert_eq!(binds_scene, reads_scene, "{file:?} with {names:?}");
         most = most.max(buffers);
     }
@@ -121,6 +124,7 @@ fn bindings_are_found_by_name() {
     let mut names: Vec<&str> = bindings.iter().map(|b| b.name.as_str()).collect();
     names.sort_unstable();
     let expected = [
+        "attribute_texels",
         "counters",
         "deviations",
         "dispatch",
