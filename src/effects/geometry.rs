@@ -22,6 +22,7 @@ pub(super) fn rows() -> Vec<Row> {
             .excludes([Effect::Bvh])
             .marks([
                 "FIRST_CENTERED",
+                "SPHERE_COUNT",
                 "sphere_texels",
                 "sphere_texel",
                 "SPHERE_TEXELS",

@@ -272,6 +272,14 @@ impl Effects {
         !self.has(Effect::Baked)
     }
 
+    /// Whether the kernel reads of the scene's buffer: poles, charts or lamps.
+    #[must_use]
+    pub fn reads_scene(&self) -> bool {
+        let keeps = self.keeps_spheres();
+        let per_sphere = keeps && (self.has(Effect::Pole) || self.has(Effect::RadianceCache));
+        per_sphere || self.has(Effect::Lights) && (keeps || self.has(Effect::Table))
+    }
+
     /// The form of the geometry: `baked`, `list` or `bvh`.
     #[must_use]
     pub fn geometry(&self) -> &'static str {

@@ -82,6 +82,7 @@ pub(super) fn rows() -> Vec<Row> {
             "chart_of",
             "charts",
             "CELLS",
+            "CHART_COUNT",
             "CELLS_WIDTH",
         ]),
     ]

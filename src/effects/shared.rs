@@ -15,7 +15,12 @@ pub struct Shared {
 
 impl Shared {
     /// All of them.
-    pub const ALL: [Self; 2] = [
+    pub const ALL: [Self; 3] = [
+        Self {
+            what: "the scene's buffer",
+            is_used: Effects::reads_scene,
+            marks: &["data::SceneData", "data::scene"],
+        },
         Self {
             what: "paths that cross surfaces",
             is_used: Effects::transmits,

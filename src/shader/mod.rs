@@ -318,8 +318,11 @@ fn config(scene: &Scene, placement: &Placement, effects: &Effects) -> String {
     }
     if effects.has(Effect::RadianceCache) {
         let cells = placement.cells().map_or(0, |cells| cells.count());
-        text +=
-            &format!("const CELLS: u32 = {cells}u;\nconst CELLS_WIDTH: u32 = {CELLS_WIDTH}u;\n");
+        let charts = placement.spheres.len();
+        text += &format!(
+            "const CHART_COUNT: u32 = {charts}u;\nconst CELLS: u32 = {cells}u;\n\
+             const CELLS_WIDTH: u32 = {CELLS_WIDTH}u;\n"
+        );
     }
     if effects.has(Effect::Bvh) {
         let tree = placement.tree();

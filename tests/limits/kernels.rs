@@ -101,11 +101,11 @@ fn few_storage_buffers_are_bound() {
             2 + usize::from(binds_scene) + usize::from(effects.has(Effect::RadianceCache)),
             "{file:?} with {names:?}"
         );
-        let keeps = effects.keeps_spheres();
-        let per_sphere = keeps && (effects.has(Effect::Pole) || effects.has(Effect::RadianceCache));
-        let lamps = effects.has(Effect::Lights) && (keeps || effects.has(Effect::Table));
-        let reads_scene = per_sphere || lamps;
-        assert_eq!(binds_scene, reads_scene, "{file:?} with {names:?}");
+        assert_eq!(
+            binds_scene,
+            effects.reads_scene(),
+            "{file:?} with {names:?}"
+        );
         most = most.max(buffers);
     }
     // What adapters are asked for is what is needed.
