@@ -275,9 +275,9 @@ impl Effects {
     /// Whether the kernel reads of the scene's buffer: poles, charts or lamps.
     #[must_use]
     pub fn reads_scene(&self) -> bool {
-        let keeps = self.keeps_spheres();
-        let per_sphere = keeps && (self.has(Effect::Pole) || self.has(Effect::RadianceCache));
-        per_sphere || self.has(Effect::Lights) && (keeps || self.has(Effect::Table))
+        let kept = self.has(Effect::List) || self.has(Effect::Bvh);
+        let per_sphere = kept && (self.has(Effect::Pole) || self.has(Effect::RadianceCache));
+        per_sphere || self.has(Effect::Lights) && (kept || self.has(Effect::Table))
     }
 
     /// The form of the geometry: `baked`, `list` or `bvh`.

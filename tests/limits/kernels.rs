@@ -130,7 +130,6 @@ fn bindings_are_found_by_name() {
         "dispatch",
         "material_texels",
         "partials",
-        "scene",
         "sum_high",
         "sum_low",
         "tree",
