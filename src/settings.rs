@@ -253,7 +253,7 @@ pub enum GeometryChoice {
     Auto,
     /// Spheres as constants in the kernel.
     Baked,
-    /// A loop over a storage buffer.
+    /// A loop over spheres in a texture.
     List,
     /// A tree.
     Bvh,

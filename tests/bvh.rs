@@ -151,7 +151,7 @@ fn probe(placement: &Placement, form: &str, effects: &[&str]) -> Probe {
     let gray = materials::ALL[0].of_color(DVec3::splat(0.5));
     let gray = Material::new("gray", gray.expect("a diffuse material"));
     scene.materials.push(gray);
-    Probe::new(&gpu(), &scene, placement, &effects).unwrap_or_else(|e| panic!("{e}"))
+    Probe::new(&gpu(), &scene, placement, &effects)
 }
 
 fn empty() -> Placement {

@@ -139,7 +139,7 @@ fn found() -> &'static [Found] {
         let mut found = Vec::new();
         for (integrator, most) in [(Integrator::Bsdf, CASES), (LECTURE, UNIFORM_CASES)] {
             let most = if thorough() { usize::MAX } else { most };
-            let each = Subjects::each(&gpu(), integrator).unwrap_or_else(|e| panic!("{e}"));
+            let each = Subjects::each(&gpu(), integrator);
             let chosen = each.iter().flat_map(|subjects| {
                 let first = subjects.first_of_each_form(most);
                 first.map(move |subject| (subjects, subject))
@@ -278,7 +278,6 @@ fn moments_are_within_their_bounds() {
 fn glass(factor: f64) -> Vec<Outcome> {
     let kinds = [1.5, 2.4].map(|ior| MaterialKind::from(Dielectric::smooth(ior)));
     let subjects = Subjects::of(&gpu(), kinds.into(), Integrator::Bsdf);
-    let subjects = subjects.unwrap_or_else(|e| panic!("{e}"));
     let mut outcomes = Vec::new();
     for subject in 0..subjects.kinds().len() {
         let draws = Draw::all(&subjects, subject, drawn()).unwrap_or_else(|e| panic!("{e}"));

@@ -206,7 +206,7 @@ fn compare(scene: &Scene, geometry: GeometryChoice, anchor: fn(DVec3) -> DVec3) 
     let placement = Placement::new(scene, settings.width, settings.height);
     assert_eq!(placement.poles, 3);
     let effects = Effects::derive(scene, &placement, &settings);
-    let probe = Probe::new(&gpu(), scene, &placement, &effects).unwrap_or_else(|e| panic!("{e}"));
+    let probe = Probe::new(&gpu(), scene, &placement, &effects);
     let mut random = Random::new("flakes on spheres");
     let flakes = flakes();
     let mut all = Vec::new();

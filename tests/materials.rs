@@ -29,7 +29,7 @@ const TERMS: usize = 100_000;
 const LECTURE: Integrator = Integrator::Lecture { termination: 0.2 };
 
 fn subjects(integrator: Integrator) -> Subjects {
-    Subjects::all(&gpu(), integrator).unwrap_or_else(|e| panic!("{e}"))
+    Subjects::all(&gpu(), integrator)
 }
 
 /// Each case of each material in turn. Under the lecture's integrator directions are the same for all, values those of
@@ -136,8 +136,7 @@ fn each_material_alone_is_the_same() {
     for integrator in [Integrator::Bsdf, LECTURE] {
         for material in ALL {
             let cases = (material.cases)();
-            let subjects =
-                Subjects::of(&gpu(), cases, integrator).unwrap_or_else(|e| panic!("{e}"));
+            let subjects = Subjects::of(&gpu(), cases, integrator);
             for (subject, name) in each(&subjects, integrator) {
                 let found = samples(&subjects, subject, questions() / 10, Wrong::default());
                 assert_agrees(&name, &found.expect("the probe runs"));

@@ -227,7 +227,7 @@ fn a_table_of_nylon_is_nylon() {
 fn the_device_reads_whole_tables() {
     let both = [measured(&metal_file()), measured(&NYLON)];
     let kinds = both.map(MaterialKind::from).into();
-    let subjects = Subjects::of(&gpu(), kinds, Integrator::Bsdf).unwrap_or_else(|e| panic!("{e}"));
+    let subjects = Subjects::of(&gpu(), kinds, Integrator::Bsdf);
     for subject in 0..2 {
         let drawn = |wrong| samples(&subjects, subject, 2000, wrong).expect("the probe runs");
         let valued = |wrong| values(&subjects, subject, 2000, wrong).expect("the probe runs");

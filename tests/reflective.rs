@@ -42,7 +42,6 @@ fn drawn(m: &Reflective, integrator: Integrator, degrees: f64) -> Vec<Sampled> {
     let inputs: Vec<BsdfInput> = (0..SAMPLES)
         .map(|_| BsdfInput::new(0, &surface, arrival(degrees), random.unit4()))
         .collect();
-    let probe = probe.unwrap_or_else(|e| panic!("{e}"));
     probe.sample(&inputs).unwrap_or_else(|e| panic!("{e}"))
 }
 

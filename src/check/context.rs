@@ -53,18 +53,12 @@ impl Context {
         let settings = Settings::for_scene(&scene);
         let placement = Placement::with_offset(&scene, settings.width, settings.height, offset);
         let effects = Effects::of(&[effects, exits, &[Effect::Baked]].concat());
-        Probe::new(&self.gpu, &scene, &placement, &effects)
+        Ok(Probe::new(&self.gpu, &scene, &placement, &effects))
     }
 
     /// These materials.
-    ///
-    /// # Errors
-    /// If the device fails.
-    pub fn materials(
-        &self,
-        materials: &[MaterialKind],
-        integrator: Integrator,
-    ) -> Result<BsdfProbe> {
+    #[must_use]
+    pub fn materials(&self, materials: &[MaterialKind], integrator: Integrator) -> BsdfProbe {
         BsdfProbe::new(&self.gpu, materials, integrator)
     }
 

@@ -46,7 +46,7 @@ fn dispersion(context: &Context) -> Result<Measure> {
     let settings = Settings::for_scene(&scene);
     let placement = Placement::new(&scene, settings.width, settings.height);
     let effects = Effects::derive(&scene, &placement, &settings);
-    let probe = Probe::new(&context.gpu, &scene, &placement, &effects)?;
+    let probe = Probe::new(&context.gpu, &scene, &placement, &effects);
     let mut measure = Measure::new(1.0, "of the bound");
     wavelengths(context, &probe, &mut measure)?;
     indices(context, &scene, &probe, &mut measure)?;

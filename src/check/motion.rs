@@ -206,7 +206,7 @@ fn in_crowds(context: &Context, measure: &mut Measure) -> Result<()> {
             .collect();
         let [list, tree] = [Effect::List, Effect::Bvh].map(|form| -> Result<Vec<HitRow>> {
             let effects = Effects::of(&[&glass()[..], &[Effect::Motion, form]].concat());
-            let probe = Probe::new(&context.gpu, &scene, &placement, &effects)?;
+            let probe = Probe::new(&context.gpu, &scene, &placement, &effects);
             probe.call("closest_hit", &rays)
         });
         for (ray, (list, tree)) in rays.iter().zip(list?.iter().zip(&tree?)) {

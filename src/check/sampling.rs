@@ -48,7 +48,7 @@ fn samples(context: &Context) -> Result<Measure> {
 fn materials(context: &Context, integrator: Integrator) -> Result<Vec<Outcome>> {
     let count = context.size(100_000, 1_000_000);
     let mut outcomes = Vec::new();
-    for subjects in Subjects::each(&context.gpu, integrator)? {
+    for subjects in Subjects::each(&context.gpu, integrator) {
         for subject in subjects.first_of_each_form(context.size(1, usize::MAX)) {
             // Delta lobes are the same whatever the integrator.
             if integrator == Integrator::Bsdf || subjects.is_uniform(subject) {
@@ -121,7 +121,7 @@ fn mirror(context: &Context, measure: &mut Measure) -> Result<()> {
     let silver = MaterialKind::from(Mirror {
         reflectance: reflectance.map(f64::from).into(),
     });
-    let probe = context.materials(&[silver], Integrator::Bsdf)?;
+    let probe = context.materials(&[silver], Integrator::Bsdf);
     for (input, s) in inputs.iter().zip(probe.sample(&inputs)?) {
         let normal = input.surface().normal + shift;
         let twin = (-input.wo()).reflect(normal).normalize();

@@ -75,7 +75,7 @@ fn checkers(context: &Context) -> Result<Measure> {
     let settings = Settings::for_scene(&scene);
     let placement = Placement::new(&scene, settings.width, settings.height);
     let effects = Effects::derive(&scene, &placement, &settings);
-    let probe = Probe::new(&context.gpu, &scene, &placement, &effects)?;
+    let probe = Probe::new(&context.gpu, &scene, &placement, &effects);
     let table = TextureTable::new(&scene, &placement);
     let mut random = Random::new("checkers");
     let mut inputs: Vec<[[u32; 4]; 2]> = Vec::new();

@@ -47,7 +47,7 @@ fn run(context: &Context) -> Result<Measure> {
             let rays = crowd.rays(&mut random, count, side == Side::Tracked);
             let [list, tree] = [Effect::List, Effect::Bvh].map(|form| -> Result<Vec<HitRow>> {
                 let effects = Effects::of(&[effects, &[form]].concat());
-                let probe = Probe::new(&context.gpu, &scene, &placement, &effects)?;
+                let probe = Probe::new(&context.gpu, &scene, &placement, &effects);
                 probe.call("closest_hit", &rays)
             });
             for (ray, (list, tree)) in rays.iter().zip(list?.iter().zip(&tree?)) {

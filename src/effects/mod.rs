@@ -252,6 +252,8 @@ impl Effects {
             ("patterned", self.has_patterns()),
             ("flaked", self.has_flakes()),
             ("mixes", self.has_mixes()),
+            ("recorded", self.reads_records()),
+            ("lamps", self.reads_lamps()),
             ("mix_deltas", self.mixes_deltas()),
             ("mixed_textures", self.has_mixes() && self.has_textures()),
             ("weighed", self.weighs_lights()),
@@ -266,18 +268,26 @@ impl Effects {
         ])
     }
 
-    /// Whether spheres are in buffers, not in the kernel.
+    /// Whether spheres are in textures, not in the kernel.
     #[must_use]
     pub fn keeps_spheres(&self) -> bool {
         !self.has(Effect::Baked)
     }
 
-    /// Whether the kernel reads of the scene's buffer: poles, charts or lamps.
+    /// Whether the kernel reads records of textures, mixes, lamps, and of spheres about their poles or with charts.
     #[must_use]
-    pub fn reads_scene(&self) -> bool {
-        let kept = self.has(Effect::List) || self.has(Effect::Bvh);
-        let per_sphere = kept && (self.has(Effect::Pole) || self.has(Effect::RadianceCache));
-        per_sphere || self.has(Effect::Lights) && (kept || self.has(Effect::Table))
+    pub fn reads_records(&self) -> bool {
+        let of_spheres = self.has(Effect::Pole) || self.has(Effect::RadianceCache);
+        self.has_textures()
+            || self.has_mixes()
+            || self.reads_lamps()
+            || self.keeps_spheres() && of_spheres
+    }
+
+    /// Whether it reads records of lamps.
+    #[must_use]
+    pub fn reads_lamps(&self) -> bool {
+        self.has(Effect::Lights) && (self.keeps_spheres() || self.has(Effect::Table))
     }
 
     /// The form of the geometry: `baked`, `list` or `bvh`.

@@ -80,9 +80,9 @@ pub(super) fn rows() -> Vec<Row> {
             "fill_cell",
             "CORRECTED",
             "chart_of",
-            "charts",
+            "data::chart_record",
+            "FIRST_CHART",
             "CELLS",
-            "CHART_COUNT",
             "CELLS_WIDTH",
         ]),
     ]

@@ -7,7 +7,7 @@ use super::asked::Asked;
 pub enum Effect {
     /// Spheres as constants in the kernel.
     Baked,
-    /// A loop over spheres in a storage buffer.
+    /// A loop over spheres in a texture.
     List,
     /// A tree over spheres.
     Bvh,

@@ -17,9 +17,9 @@ impl Shared {
     /// All of them.
     pub const ALL: [Self; 3] = [
         Self {
-            what: "the scene's buffer",
-            is_used: Effects::reads_scene,
-            marks: &["data::SceneData", "data::scene"],
+            what: "records of textures, mixes, lamps and spheres",
+            is_used: Effects::reads_records,
+            marks: &["data::record_texel", "data::record_texels"],
         },
         Self {
             what: "paths that cross surfaces",

@@ -116,10 +116,8 @@ pub struct BsdfProbe(Probe);
 
 impl BsdfProbe {
     /// A kernel of exactly these materials, as `integrator` samples them.
-    ///
-    /// # Errors
-    /// If the device fails.
-    pub fn new(gpu: &Gpu, materials: &[MaterialKind], integrator: Integrator) -> Result<Self> {
+    #[must_use]
+    pub fn new(gpu: &Gpu, materials: &[MaterialKind], integrator: Integrator) -> Self {
         let named =
             |(i, kind): (usize, &MaterialKind)| Material::new(&format!("m{i}"), kind.clone());
         Self::of(
@@ -130,10 +128,8 @@ impl BsdfProbe {
     }
 
     /// The same of materials that may have textures, which are looked up where a question is.
-    ///
-    /// # Errors
-    /// If the device fails.
-    pub fn of(gpu: &Gpu, materials: Vec<Material>, integrator: Integrator) -> Result<Self> {
+    #[must_use]
+    pub fn of(gpu: &Gpu, materials: Vec<Material>, integrator: Integrator) -> Self {
         let scene = scene_of(materials);
         let settings = Settings {
             integrator,
@@ -142,7 +138,7 @@ impl BsdfProbe {
         };
         let placement = Placement::new(&scene, settings.width, settings.height);
         let effects = Effects::derive(&scene, &placement, &settings);
-        Ok(Self(Probe::new(gpu, &scene, &placement, &effects)?))
+        Self(Probe::new(gpu, &scene, &placement, &effects))
     }
 
     /// Samples.

@@ -1,5 +1,5 @@
-//! What the kernel reads of a scene: records in textures, and the buffer `SceneData` (`shaders/scene/data.wesl`); the tree,
-//! the sky, images and tables.
+//! What the kernel reads of a scene, in textures: records (`shaders/scene/data.wesl`), the tree, the sky, images and
+//! tables.
 
 use bytemuck::Pod;
 
@@ -11,18 +11,15 @@ use crate::image::Picture;
 use crate::placement::Placement;
 use crate::placement::containment::MOST_CORES;
 use crate::records::layout::{
-    ATTRIBUTES_WIDTH, ChartRecord, LightRecord, PoleRecord, SKY_TABLE_WIDTH, SPHERES_WIDTH,
-    SphereRecord, light_weight, sky_table,
+    ATTRIBUTES_WIDTH, SKY_TABLE_WIDTH, SPHERES_WIDTH, SphereRecord, light_weight, sky_table,
 };
 use crate::records::material::anchored_spheres;
 use crate::records::measured::{MEASURED_WIDTH, MeasuredTables};
-use crate::records::tables::{MATERIALS_WIDTH, RECORDS_WIDTH, SceneTables};
+use crate::records::tables::{List, MATERIALS_WIDTH, RECORDS_WIDTH, SceneTables};
 use crate::records::textures::{IMAGE_WIDTH, TextureTable};
 use crate::scene::{Environment, Scene, Sky};
-use crate::shader::{Kernel, material_record};
+use crate::shader::material_record;
 
-/// Name of the buffer.
-const SCENE: &str = "scene";
 /// Names of the textures.
 const TREE: &str = "tree";
 const RECORDS: &str = "record_texels";
@@ -36,27 +33,6 @@ const MEASURED: &str = "measured_texels";
 
 /// Bytes of a texel of all of them.
 const TEXEL: usize = 16;
-
-/// Whether the device takes the scene's data, and `partials` bytes of partial sums.
-///
-/// # Errors
-/// [`Error::DeviceLimit`] if one of these is too large for it.
-pub(super) fn check(limits: &wgpu::Limits, kernel: &Kernel, partials: u64) -> Result<()> {
-    let most = limits
-        .max_storage_buffer_binding_size
-        .min(limits.max_buffer_size);
-    let data = kernel.struct_members("SceneData");
-    let data = data.map_or(0, |(_, size)| u64::from(size));
-    for (name, size) in [("scene's data", data), ("partial sums", partials)] {
-        if size > most {
-            return Err(Error::DeviceLimit(format!(
-                "the {name} need {size} bytes, more than the device's limit of {most} for one \
-                 buffer; --backend cpu has no such limit"
-            )));
-        }
-    }
-    Ok(())
-}
 
 /// Whether the device takes the tree.
 ///
@@ -151,7 +127,7 @@ pub(super) fn check_materials(
     check_rows(limits, "materials", MATERIALS_WIDTH, rows)
 }
 
-/// Whether the device takes the records of textures and of mixes.
+/// Whether the device takes the records of textures, mixes, lamps and of what else there is of few spheres.
 ///
 /// # Errors
 /// [`Error::DeviceLimit`] if there are too many.
@@ -161,9 +137,10 @@ pub(super) fn check_records(
     placement: &Placement,
     effects: &Effects,
 ) -> Result<()> {
-    let texels = SceneTables::new(scene, placement).texels(effects).len() as u64;
-    let rows = texels.div_ceil(RECORDS_WIDTH.into());
-    check_rows(limits, "textures and mixes", RECORDS_WIDTH, rows)
+    let lists = SceneTables::new(scene, placement).lists(placement, effects);
+    let texels: usize = lists.iter().map(List::size).sum();
+    let rows = (texels as u64).div_ceil(RECORDS_WIDTH.into());
+    check_rows(limits, "textures, mixes and lamps", RECORDS_WIDTH, rows)
 }
 
 /// Whether the device takes the images of textures.
@@ -195,7 +172,6 @@ pub(super) fn check_tables(
 /// What the device holds of a scene.
 #[derive(Debug)]
 pub(super) struct SceneBytes {
-    data: Option<Vec<u8>>,
     textures: Vec<Texels>,
 }
 
@@ -208,13 +184,8 @@ struct Texels {
 }
 
 impl SceneBytes {
-    /// What `kernel` reads.
-    pub(super) fn new(
-        kernel: &Kernel,
-        scene: &Scene,
-        placement: &Placement,
-        effects: &Effects,
-    ) -> Self {
+    /// What a kernel with `effects` reads.
+    pub(super) fn new(scene: &Scene, placement: &Placement, effects: &Effects) -> Self {
         let tables = SceneTables::new(scene, placement);
         let mut textures = Vec::new();
         let mut add = |name, bytes, width| textures.push(Texels { name, bytes, width });
@@ -231,8 +202,8 @@ impl SceneBytes {
             let texels = &placement.tree().texels;
             add(TREE, bytemuck::cast_slice(texels).to_vec(), WIDTH);
         }
-        if effects.has_textures() || effects.has_mixes() {
-            let texels = bytemuck::cast_slice(&tables.texels(effects)).to_vec();
+        if effects.reads_records() {
+            let texels = bytemuck::cast_slice(&tables.texels(placement, effects)).to_vec();
             add(RECORDS, in_rows(texels, RECORDS_WIDTH), RECORDS_WIDTH);
         }
         if effects.has(Effect::TextureImage) {
@@ -253,17 +224,11 @@ impl SceneBytes {
                 add(SKY_TABLE, bytes, SKY_TABLE_WIDTH);
             }
         }
-        Self {
-            data: scene_data(kernel, placement, effects),
-            textures,
-        }
+        Self { textures }
     }
 
     /// Uploads what `pass` binds.
     pub(super) fn upload<'a>(&'a self, recording: &mut Recording<'a>, pass: &Pass) {
-        if let Some(data) = self.data.as_ref().filter(|_| pass.binds(SCENE)) {
-            recording.upload(SCENE, data);
-        }
         for texture in self.textures.iter().filter(|t| pass.binds(t.name)) {
             recording.upload_texels(texture.name, &texture.bytes, texture.width);
         }
@@ -300,36 +265,9 @@ fn table_rows(width: u32, height: u32) -> u64 {
     texels.div_ceil(SKY_TABLE_WIDTH.into())
 }
 
-/// The bytes that `kernel` reads; `None` if it reads nothing of the scene.
-fn scene_data(kernel: &Kernel, placement: &Placement, effects: &Effects) -> Option<Vec<u8>> {
-    let (members, size) = kernel.struct_members("SceneData")?;
-    let mut bytes = vec![0; size as usize];
-    let ends = members.iter().skip(1).map(|(_, offset)| *offset);
-    for ((name, offset), end) in members.iter().zip(ends.chain([size])) {
-        let array = match name.as_str() {
-            "poles" => poles(kernel, placement),
-            "charts" => charts(placement),
-            "lights" => lights(kernel, placement, effects),
-            other => unreachable!("no scene data {other}"),
-        };
-        bytes[*offset as usize..end as usize][..array.len()].copy_from_slice(&array);
-    }
-    Some(bytes)
-}
-
 fn bytes_of<T: Pod>(records: impl Iterator<Item = T>) -> Vec<u8> {
     let records: Vec<T> = records.collect();
     bytemuck::cast_slice(&records).to_vec()
-}
-
-/// The starts of records, as long as the kernel's struct `name`.
-fn starts_of<T: Pod>(kernel: &Kernel, name: &str, records: impl Iterator<Item = T>) -> Vec<u8> {
-    let (_, size) = kernel.struct_members(name).unwrap_or_default();
-    let mut bytes = Vec::new();
-    for record in records {
-        bytes.extend_from_slice(&bytemuck::bytes_of(&record)[..size as usize]);
-    }
-    bytes
 }
 
 /// The texture `sphere_texels`.
@@ -351,12 +289,6 @@ fn in_rows(mut bytes: Vec<u8>, width: u32) -> Vec<u8> {
     let row = width as usize * TEXEL;
     bytes.resize(bytes.len().next_multiple_of(row).max(row), 0);
     bytes
-}
-
-fn poles(kernel: &Kernel, placement: &Placement) -> Vec<u8> {
-    let poles = placement.spheres[..placement.poles].iter();
-    let records = poles.filter_map(|s| Some(PoleRecord::new(s, s.pole?)));
-    starts_of(kernel, "Pole", records)
 }
 
 /// The texture `attribute_texels`: records of `attributes_of` in `shaders/scene/data.wesl`.
@@ -402,11 +334,6 @@ fn attribute_texels(effects: &Effects) -> usize {
     }
 }
 
-fn charts(placement: &Placement) -> Vec<u8> {
-    let charts = (0..placement.spheres.len()).map(|i| ChartRecord::new(&placement.chart(i)));
-    bytes_of(charts)
-}
-
 /// The texture `material_texels`.
 fn materials(
     scene: &Scene,
@@ -418,12 +345,4 @@ fn materials(
     let records = tables.records(scene, placement).into_iter();
     let bytes = records.flat_map(|r| r.bytes(&members, size)).collect();
     in_rows(bytes, MATERIALS_WIDTH)
-}
-
-fn lights(kernel: &Kernel, placement: &Placement, effects: &Effects) -> Vec<u8> {
-    let (members, size) = kernel.struct_members("Light").unwrap_or_default();
-    let lights = placement.lights.table.iter();
-    lights
-        .flat_map(|light| LightRecord::new(light, placement, effects).bytes(&members, size))
-        .collect()
 }

@@ -125,7 +125,7 @@ fn summarize(index: usize, adapter: &wgpu::Adapter) -> AdapterSummary {
 }
 
 /// The most storage buffers that a pass may bind. Devices have eight; the others are left for what comes.
-pub const STORAGE_BUFFERS: u32 = 4;
+pub const STORAGE_BUFFERS: u32 = 3;
 
 /// What the kernel needs and the adapter does not have.
 fn lacks(adapter: &wgpu::Adapter, limits: &wgpu::Limits) -> Option<String> {

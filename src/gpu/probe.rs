@@ -44,8 +44,11 @@ pub struct ShapeRecord {
 #[derive(Debug)]
 pub struct Probe {
     gpu: Gpu,
-    camera: CameraRecord,
-    folders: BTreeMap<Folder, Linked>,
+    scene: Scene,
+    placement: Placement,
+    effects: Effects,
+    /// Folders of which a function was asked for.
+    folders: Mutex<BTreeMap<Folder, Arc<Linked>>>,
     /// Functions that were called, by name: a driver takes seconds to compile a large one.
     compiled: Mutex<BTreeMap<String, Arc<Pass>>>,
 }
@@ -58,46 +61,60 @@ struct Linked {
 }
 
 impl Probe {
-    /// Links the functions that `effects` bring; `scene` and `placement` give camera and
-    /// environment.
-    ///
-    /// # Errors
-    /// [`Error::Shader`] if they do not link, [`Error::Gpu`] if the device refuses them.
-    pub fn new(gpu: &Gpu, scene: &Scene, placement: &Placement, effects: &Effects) -> Result<Self> {
-        let mut folders = BTreeMap::new();
-        for folder in Folder::ALL {
-            let kernel = link(Stage::Probe(folder), scene, placement, effects)?;
-            let program = Program::new(gpu, "probe", kernel);
-            gpu.check()?;
-            let data = SceneBytes::new(program.kernel(), scene, placement, effects);
-            folders.insert(folder, Linked { program, data });
-        }
-        Ok(Self {
+    /// The functions that `effects` bring, with the camera, the environment and the spheres of `scene` as it is placed.
+    #[must_use]
+    pub fn new(gpu: &Gpu, scene: &Scene, placement: &Placement, effects: &Effects) -> Self {
+        Self {
             gpu: gpu.clone(),
-            folders,
-            camera: CameraRecord::new(&placement.camera),
+            scene: scene.clone(),
+            placement: placement.clone(),
+            effects: effects.clone(),
+            folders: Mutex::default(),
             compiled: Mutex::default(),
-        })
+        }
     }
 
-    /// The kernel that has the entry point `entry`, and what it reads of the scene.
-    fn linked(&self, entry: &str) -> Option<&Linked> {
-        let linked = &self.folders[&Folder::with(entry)?];
+    /// The functions of a folder, linked once.
+    fn folder(&self, folder: Folder) -> Result<Arc<Linked>> {
+        let mut folders = self.folders.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(linked) = folders.get(&folder) {
+            return Ok(linked.clone());
+        }
+        let (scene, placement, effects) = (&self.scene, &self.placement, &self.effects);
+        let kernel = link(Stage::Probe(folder), scene, placement, effects)?;
+        let program = Program::new(&self.gpu, "probe", kernel);
+        self.gpu.check()?;
+        let data = SceneBytes::new(scene, placement, effects);
+        let linked = Arc::new(Linked { program, data });
+        folders.insert(folder, linked.clone());
+        Ok(linked)
+    }
+
+    /// The kernel that has the entry point `entry`, and what it reads of the scene; `None` if no effect in use brings it.
+    fn linked(&self, entry: &str) -> Result<Option<Arc<Linked>>> {
+        let Some(folder) = Folder::with(entry) else {
+            return Ok(None);
+        };
+        let linked = self.folder(folder)?;
         let mut entries = linked.program.kernel().module.entry_points.iter();
-        entries.any(|e| e.name == entry).then_some(linked)
+        let found = entries.any(|e| e.name == entry);
+        Ok(found.then_some(linked))
     }
 
     /// What the entry point `entry` binds; nothing if no effect in use brings it.
-    #[must_use]
-    pub fn bindings(&self, entry: &str) -> Vec<Binding> {
-        let kernel = self.linked(entry).map(|linked| linked.program.kernel());
-        kernel.map_or(vec![], |kernel| kernel.bindings(entry))
+    ///
+    /// # Errors
+    /// [`Error::Shader`] if its folder does not link, [`Error::Gpu`] if the device refuses it.
+    pub fn bindings(&self, entry: &str) -> Result<Vec<Binding>> {
+        let linked = self.linked(entry)?;
+        Ok(linked.map_or(vec![], |linked| linked.program.kernel().bindings(entry)))
     }
 
     /// Calls `function` once for each of `inputs`.
     ///
     /// # Errors
-    /// [`Error::Gpu`] if the device fails, [`Error::Shader`] if no effect in use brings `function`.
+    /// [`Error::Gpu`] if the device fails, [`Error::Shader`] if its folder does not link or no effect in use brings
+    /// `function`.
     ///
     /// # Panics
     /// If an input or an output is not a whole number of rows.
@@ -114,9 +131,10 @@ impl Probe {
         );
         let entry = format!("probe_{function}");
         let linked = self
-            .linked(&entry)
+            .linked(&entry)?
             .ok_or_else(|| Error::Shader(format!("the kernel has no function {function}")))?;
-        let pass = self.compiled(linked, &entry)?;
+        let pass = self.compiled(&linked, &entry)?;
+        let camera = CameraRecord::new(&self.placement.camera);
         let mut engine = Engine::new(self.gpu.clone());
         let mut outputs = Vec::with_capacity(inputs.len());
         let mut data = Recording::default();
@@ -132,7 +150,7 @@ impl Probe {
             engine.buffer("outputs", (part.len() * size_of::<O>()) as u64);
             let mut recording = Recording::default();
             recording
-                .upload("view", bytemuck::bytes_of(&self.camera))
+                .upload("view", bytemuck::bytes_of(&camera))
                 .upload("shape", bytemuck::bytes_of(&shape))
                 .upload("inputs", bytemuck::cast_slice(part))
                 .dispatch(&pass, part.len().div_ceil(WORKGROUP) as u32)

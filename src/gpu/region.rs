@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::film::TILE;
 use crate::film::{NonFinite, PixelSums, Tally};
 use crate::gpu::engine::{Engine, Reading, Readings, Recording};
@@ -19,12 +19,30 @@ const TEXTURES: [&str; 3] = ["sum_high", "sum_low", "deviations"];
 
 /// Longest side of a region: a multiple of the tile's, such that one buffer can hold its partial sums.
 pub(super) fn side(limits: &wgpu::Limits, partial_size: u32) -> u32 {
-    let bytes = limits
-        .max_storage_buffer_binding_size
-        .min(limits.max_buffer_size);
-    let pixels = (bytes / u64::from(partial_size)).isqrt();
+    let pixels = (largest_buffer(limits) / u64::from(partial_size)).isqrt();
     let most = u64::from(REGION.min(limits.max_texture_dimension_2d)).min(pixels);
     (most as u32 / TILE * TILE).max(TILE)
+}
+
+/// Whether the device takes `bytes` of partial sums: a tile's may be too much.
+///
+/// # Errors
+/// [`Error::DeviceLimit`] if one buffer cannot hold them.
+pub(super) fn check(limits: &wgpu::Limits, bytes: u64) -> Result<()> {
+    let most = largest_buffer(limits);
+    if bytes > most {
+        return Err(Error::DeviceLimit(format!(
+            "the partial sums need {bytes} bytes, more than the device's limit of {most} for one buffer; \
+             --backend cpu has no such limit"
+        )));
+    }
+    Ok(())
+}
+
+/// Bytes of the largest storage buffer.
+fn largest_buffer(limits: &wgpu::Limits) -> u64 {
+    let binding = limits.max_storage_buffer_binding_size;
+    binding.min(limits.max_buffer_size)
 }
 
 /// Tiles of a region.

@@ -94,7 +94,7 @@ impl GpuRenderer {
             settings.crop.height.min(side),
         );
         let partials = u64::from(width) * u64::from(height) * u64::from(partial_size);
-        data::check(&gpu.limits, &kernel, partials)?;
+        region::check(&gpu.limits, partials)?;
         if effects.keeps_spheres() {
             data::check_spheres(&gpu.limits, placement, effects)?;
             data::check_materials(&gpu.limits, scene, placement, effects)?;
@@ -105,7 +105,7 @@ impl GpuRenderer {
         if let Some(sky) = data::sky_of(scene, effects) {
             data::check_sky(&gpu.limits, sky)?;
         }
-        if effects.has_textures() || effects.has_mixes() {
+        if effects.reads_records() {
             data::check_records(&gpu.limits, scene, placement, effects)?;
         }
         if effects.has(Effect::TextureImage) {
@@ -143,7 +143,7 @@ impl GpuRenderer {
         let camera = CameraRecord::new(&placement.camera);
         let all = ChosenTiles::all();
         let nothing = DispatchRecord::zeroed();
-        let data = SceneBytes::new(program.kernel(), scene, placement, effects);
+        let data = SceneBytes::new(scene, placement, effects);
         let mut recording = Recording::default();
         recording.upload(VIEW, bytemuck::bytes_of(&camera));
         if render.binds(ADAPTIVE_TILES) {

@@ -3,8 +3,6 @@
 //! Structs of fixed layout are `bytemuck` structs; a test compares their offsets with naga's.
 //! `Material` loses the members that no effect in use needs, and its records with it ([`material`](super::material)).
 
-use std::mem::offset_of;
-
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 
@@ -15,8 +13,8 @@ use crate::placement::sky::{Band, Entry};
 use crate::placement::{Light, PlacedCamera, PlacedSphere, Placement, SkyTable};
 use crate::settings::Rect;
 
-/// `Sphere` of `shaders/scene/data.wesl`: a sphere about its centre. Where nothing moves, the kernel's struct ends
-/// before the way.
+/// A record of `sphere_of` in `shaders/scene/data.wesl`: a sphere about its centre. Where nothing moves it ends before
+/// the way.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub struct SphereRecord {
@@ -43,8 +41,8 @@ impl SphereRecord {
     }
 }
 
-/// `Pole` of `shaders/scene/data.wesl`: a sphere about its pole. Where nothing moves, the kernel's struct ends before
-/// the way.
+/// A record of `pole_of` in `shaders/scene/data.wesl`: a sphere about its pole. Where nothing moves it ends before the
+/// way.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub struct PoleRecord {
@@ -89,8 +87,8 @@ pub(crate) fn light_weight(index: usize, placement: &Placement, effects: &Effect
         })
 }
 
-/// `Light` of `shaders/scene/data.wesl`. Without pole frames the kernel's struct has none of their members, and where
-/// nothing moves no way.
+/// A record of `lamp_of` in `shaders/scene/data.wesl`. Where nothing moves it ends before the way, and without pole
+/// frames before what is for them.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 #[expect(missing_docs, reason = "the members are those of the kernel's struct")]
@@ -127,25 +125,6 @@ impl LightRecord {
             motion: sphere.motion.as_vec3().to_array(),
             unused: 0.0,
         }
-    }
-
-    /// The record's bytes in a struct with these members, at these offsets, and this size.
-    #[must_use]
-    pub fn bytes(&self, members: &[(String, u32)], size: u32) -> Vec<u8> {
-        let own = bytemuck::bytes_of(self);
-        let mut bytes = vec![0; size as usize];
-        // Those that all have; then those about a pole, and the way.
-        let parts = [
-            ("anchor", 0..offset_of!(Self, pole)),
-            ("pole", offset_of!(Self, pole)..offset_of!(Self, motion)),
-            ("motion", offset_of!(Self, motion)..offset_of!(Self, unused)),
-        ];
-        for (name, part) in parts {
-            if let Some((_, offset)) = members.iter().find(|(member, _)| member == name) {
-                bytes[*offset as usize..][..part.len()].copy_from_slice(&own[part]);
-            }
-        }
-        bytes
     }
 }
 
@@ -267,7 +246,7 @@ pub struct DispatchRecord {
 /// Columns of the texture `cell_values` of `shaders/cache/cells.wesl`.
 pub const CELLS_WIDTH: u32 = 1024;
 
-/// `Chart` of `shaders/cache/chart.wesl`.
+/// A record of `chart_record` in `shaders/scene/data.wesl`.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 #[expect(missing_docs, reason = "the members are those of the kernel's struct")]

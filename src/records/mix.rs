@@ -124,4 +124,10 @@ impl MixTable {
             [part.weight.to_bits(), part.second, first, end]
         })
     }
+
+    /// All weights that are textures as `PartWeight`: the texture, and of which of the two.
+    pub fn weight_texels(&self) -> impl Iterator<Item = [u32; 4]> {
+        let weights = self.weights.iter();
+        weights.map(|&[number, second]| [number, second, 0, 0])
+    }
 }

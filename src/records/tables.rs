@@ -1,14 +1,17 @@
 //! All that a kernel's records of materials refer to by numbers.
 
+use bytemuck::Pod;
+
 use crate::effects::{Effect, Effects};
 use crate::materials::Material;
 use crate::materials::measured::START;
 use crate::materials::mix::PARTS;
-use crate::placement::Placement;
+use crate::placement::{Light, PlacedSphere, Placement};
+use crate::records::layout::{ChartRecord, LightRecord, PoleRecord};
 use crate::records::material::{MaterialRecord, Numbers, anchored_spheres};
 use crate::records::measured::MeasuredTables;
 use crate::records::mix::MixTable;
-use crate::records::textures::{ImageRecord, TextureTable};
+use crate::records::textures::TextureTable;
 use crate::scene::Scene;
 
 /// Columns of the texture `material_texels` of `shaders/scene/data.wesl`.
@@ -45,29 +48,67 @@ impl SceneTables {
         }
     }
 
-    /// The texture `record_texels` but for the zeros that fill its last row: patterns, images, parts of mixes, and their
-    /// weights.
+    /// The lists of the texture `record_texels`, in their order.
     #[must_use]
-    pub fn texels(&self, effects: &Effects) -> Vec<Texel> {
-        let mut texels = Vec::new();
-        for pattern in self.textures.patterns() {
-            let whole: &[Texel] = bytemuck::cast_slice(std::slice::from_ref(pattern));
-            texels.extend(&whole[..pattern_texels(effects)]);
-        }
-        texels.extend::<&[Texel]>(bytemuck::cast_slice(self.textures.images()));
-        texels.extend(self.mixes.part_texels());
-        let weights = self.mixes.weights().iter();
-        texels.extend(weights.map(|&[number, second]| [number, second, 0, 0]));
-        texels
+    pub fn lists(&self, placement: &Placement, effects: &Effects) -> [List; 7] {
+        let [pole, motion, charts] =
+            [Effect::Pole, Effect::Motion, Effect::RadianceCache].map(|e| effects.has(e));
+        let kept = |count: usize, asked: bool| match asked && effects.keeps_spheres() {
+            true => count,
+            false => 0,
+        };
+        let lamps = match effects.reads_lamps() {
+            true => placement.lights.table.len(),
+            false => 0,
+        };
+        // What only some scenes ask for ends a record.
+        let of_lamp = match (motion, pole) {
+            (true, _) => 4,
+            (false, true) => 3,
+            (false, false) => 2,
+        };
+        [
+            (
+                "FIRST_PATTERN",
+                self.textures.patterns().len(),
+                if pole { 4 } else { 2 },
+            ),
+            ("FIRST_IMAGE", self.textures.images().len(), 4),
+            ("FIRST_PART", self.mixes.parts(), 1),
+            ("FIRST_WEIGHT", self.mixes.weights().len(), 1),
+            (
+                "FIRST_POLE",
+                kept(placement.poles, pole),
+                if motion { 3 } else { 2 },
+            ),
+            ("FIRST_CHART", kept(placement.spheres.len(), charts), 3),
+            ("FIRST_LIGHT", lamps, of_lamp),
+        ]
+        .map(|(first, count, texels)| List {
+            first,
+            count,
+            texels,
+        })
     }
 
-    /// Its texels at which images, parts and weights begin.
+    /// The texture `record_texels` but for the zeros that fill its last row.
     #[must_use]
-    pub fn firsts(&self, effects: &Effects) -> [usize; 3] {
-        let image = pattern_texels(effects) * self.textures.patterns().len();
-        let part =
-            image + size_of::<ImageRecord>() / size_of::<Texel>() * self.textures.images().len();
-        [image, part, part + self.mixes.parts()]
+    pub fn texels(&self, placement: &Placement, effects: &Effects) -> Vec<Texel> {
+        let [patterns, images, parts, weights, poles, charts, lamps] =
+            self.lists(placement, effects);
+        let spheres = &placement.spheres;
+        let of_pole = |sphere: &PlacedSphere| Some(PoleRecord::new(sphere, sphere.pole?));
+        let of_chart = |index: usize| ChartRecord::new(&placement.chart(index));
+        let of_lamp = |light: &Light| LightRecord::new(light, placement, effects);
+        let mut texels = Vec::new();
+        patterns.write(&mut texels, self.textures.patterns().iter().copied());
+        images.write(&mut texels, self.textures.images().iter().copied());
+        parts.write(&mut texels, self.mixes.part_texels());
+        weights.write(&mut texels, self.mixes.weight_texels());
+        poles.write(&mut texels, spheres.iter().filter_map(of_pole));
+        charts.write(&mut texels, (0..spheres.len()).map(of_chart));
+        lamps.write(&mut texels, placement.lights.table.iter().map(of_lamp));
+        texels
     }
 
     /// The record of a material of the scene, for spheres about their centres.
@@ -125,7 +166,29 @@ impl SceneTables {
     }
 }
 
-/// Texels of a pattern: what is for pole frames ends the record.
-fn pattern_texels(effects: &Effects) -> usize {
-    if effects.has(Effect::Pole) { 4 } else { 2 }
+/// A list of records in `record_texels`.
+#[derive(Clone, Copy, Debug)]
+pub struct List {
+    /// The constant of the kernel that says at which texel it begins.
+    pub first: &'static str,
+    /// How many records it has.
+    pub count: usize,
+    /// How many texels each has: the first of those of the host's record.
+    pub texels: usize,
+}
+
+impl List {
+    /// How many texels it takes.
+    #[must_use]
+    pub fn size(&self) -> usize {
+        self.count * self.texels
+    }
+
+    /// Appends it: the starts of its records.
+    fn write<T: Pod>(&self, texels: &mut Vec<Texel>, records: impl Iterator<Item = T>) {
+        for record in records.take(self.count) {
+            let whole: &[Texel] = bytemuck::cast_slice(bytemuck::bytes_of(&record));
+            texels.extend(&whole[..self.texels]);
+        }
+    }
 }

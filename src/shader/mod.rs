@@ -129,11 +129,19 @@ pub enum Folder {
     Scene,
     Materials,
     Light,
+    /// Records of `scene/data`.
+    Data,
 }
 
 impl Folder {
     /// All of them.
-    pub const ALL: [Self; 4] = [Self::Core, Self::Scene, Self::Materials, Self::Light];
+    pub const ALL: [Self; 5] = [
+        Self::Core,
+        Self::Scene,
+        Self::Materials,
+        Self::Light,
+        Self::Data,
+    ];
 
     fn root(self) -> &'static str {
         match self {
@@ -141,6 +149,7 @@ impl Folder {
             Self::Scene => "probe/scene",
             Self::Materials => "probe/materials",
             Self::Light => "probe/light",
+            Self::Data => "probe/data",
         }
     }
 
@@ -318,11 +327,8 @@ fn config(scene: &Scene, placement: &Placement, effects: &Effects) -> String {
     }
     if effects.has(Effect::RadianceCache) {
         let cells = placement.cells().map_or(0, |cells| cells.count());
-        let charts = placement.spheres.len();
-        text += &format!(
-            "const CHART_COUNT: u32 = {charts}u;\nconst CELLS: u32 = {cells}u;\n\
-             const CELLS_WIDTH: u32 = {CELLS_WIDTH}u;\n"
-        );
+        text +=
+            &format!("const CELLS: u32 = {cells}u;\nconst CELLS_WIDTH: u32 = {CELLS_WIDTH}u;\n");
     }
     if effects.has(Effect::Bvh) {
         let tree = placement.tree();
@@ -346,12 +352,13 @@ fn config(scene: &Scene, placement: &Placement, effects: &Effects) -> String {
     if effects.has_textures() {
         text += &format!("const IMAGE_WIDTH: u32 = {IMAGE_WIDTH}u;\n");
     }
-    if effects.has_textures() || effects.has_mixes() {
-        let [image, part, weight] = SceneTables::new(scene, placement).firsts(effects);
-        text += &format!(
-            "const RECORDS_WIDTH: u32 = {RECORDS_WIDTH}u;\nconst FIRST_IMAGE: u32 = {image}u;\n\
-             const FIRST_PART: u32 = {part}u;\nconst FIRST_WEIGHT: u32 = {weight}u;\n"
-        );
+    if effects.reads_records() {
+        text += &format!("const RECORDS_WIDTH: u32 = {RECORDS_WIDTH}u;\n");
+        let mut start = 0;
+        for list in SceneTables::new(scene, placement).lists(placement, effects) {
+            text += &format!("const {}: u32 = {start}u;\n", list.first);
+            start += list.size();
+        }
     }
     if effects.has_tables() {
         text += &format!("const MEASURED_WIDTH: u32 = {MEASURED_WIDTH}u;\n");

@@ -58,6 +58,7 @@ sources![
     "path/termination/throughput",
     "path/turns",
     "probe/core",
+    "probe/data",
     "probe/light",
     "probe/materials",
     "probe/rows",

@@ -120,7 +120,7 @@ pub(crate) fn probe_of(scene: &Scene, effects: &[&str]) -> Probe {
         &["baked"]
     };
     let effects = Effects::named(&[effects, geometry].concat());
-    Probe::new(&gpu(), scene, &placement, &effects).unwrap_or_else(|e| panic!("{e}"))
+    Probe::new(&gpu(), scene, &placement, &effects)
 }
 
 /// A probe of the functions that exactly `effects` bring.

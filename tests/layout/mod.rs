@@ -1,16 +1,16 @@
 //! The structs that host and kernel share have the same layout on both sides.
 
-mod by_effects;
 mod fixed;
 mod glsl;
 mod material;
+mod records;
 
 use std::mem::offset_of;
 
 use crate::common::scene;
 use gpu_trace::effects::Effects;
 use gpu_trace::placement::Placement;
-use gpu_trace::records::layout::{CameraRecord, LightRecord, PoleRecord, SphereRecord};
+use gpu_trace::records::layout::CameraRecord;
 use gpu_trace::settings::Settings;
 use gpu_trace::shader::{Kernel, Stage, link};
 use gpu_trace::verify::EMPTY;
@@ -97,39 +97,14 @@ fn camera() -> Layout {
     })
 }
 
-fn light() -> Layout {
-    host!(LightRecord {
-        anchor,
-        radius,
-        weight,
-        threshold,
-        other,
-        sphere,
-        pole,
-        curvature,
-        motion,
-        unused,
-    })
-}
-
-fn sphere() -> Layout {
-    host!(SphereRecord {
-        center,
-        radius,
-        motion,
-        unused,
-    })
-}
-
-fn pole() -> Layout {
-    host!(PoleRecord {
-        point,
-        curvature,
-        normal,
-        unused,
-        motion,
-        unused1,
-    })
+#[test]
+fn a_camera_without_lens_is_the_start_of_one_with_a_lens() {
+    let device = device(&kernel(Stage::Path, &["list"]), "Camera");
+    assert!(
+        device.0.iter().all(|(name, _)| !name.contains("lens")),
+        "{device:?}"
+    );
+    assert_eq!(mismatch(&camera(), &device, true), None);
 }
 
 #[test]

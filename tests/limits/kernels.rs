@@ -87,7 +87,7 @@ fn kernels_of(file: PathBuf) -> Vec<Linked> {
     all
 }
 
-/// Four of eight stay free for what comes, five without a radiance cache.
+/// Five of eight stay free for what comes, six without a radiance cache.
 #[test]
 fn few_storage_buffers_are_bound() {
     let mut most = 0;
@@ -95,15 +95,9 @@ fn few_storage_buffers_are_bound() {
         let (file, bindings, effects) = (&linked.file, &linked.bindings, &linked.effects);
         let buffers = bindings.iter().filter(|b| b.storage_buffer).count();
         let names: Vec<_> = effects.names().collect();
-        let binds_scene = bindings.iter().any(|b| b.name == "scene");
         assert_eq!(
             buffers,
-            2 + usize::from(binds_scene) + usize::from(effects.has(Effect::RadianceCache)),
-            "{file:?} with {names:?}"
-        );
-        assert_eq!(
-            binds_scene,
-            effects.reads_scene(),
+            2 + usize::from(effects.has(Effect::RadianceCache)),
             "{file:?} with {names:?}"
         );
         most = most.max(buffers);
@@ -139,7 +133,7 @@ fn bindings_are_found_by_name() {
     assert_eq!(kernel.bindings("no entry point"), []);
     let probe = crate::common::probe(&["list"]);
     let names = |entry: &str| {
-        let bindings = probe.bindings(entry);
+        let bindings = probe.bindings(entry).unwrap_or_else(|e| panic!("{e}"));
         let mut names: Vec<String> = bindings.into_iter().map(|b| b.name).collect();
         names.sort_unstable();
         names

@@ -62,7 +62,7 @@ fn probe_of(scene: &Scene) -> (Probe, Placement, Vec<Option<u32>>) {
         all.first().map(|(_, number)| *number)
     });
     let numbers = numbers.collect();
-    let probe = Probe::new(&gpu(), scene, &placement, &effects).unwrap_or_else(|e| panic!("{e}"));
+    let probe = Probe::new(&gpu(), scene, &placement, &effects);
     (probe, placement, numbers)
 }
 

@@ -75,8 +75,8 @@ fn off(subjects: &Subjects, subject: usize) -> (Compared, Option<Compared>) {
 
 #[test]
 fn materials_are_what_their_textures_say() {
-    let subjects = Subjects::textured(&gpu(), true).unwrap_or_else(|e| panic!("{e}"));
-    let plain = Subjects::textured(&gpu(), false).unwrap_or_else(|e| panic!("{e}"));
+    let subjects = Subjects::textured(&gpu(), true);
+    let plain = Subjects::textured(&gpu(), false);
     for (subject, kind) in subjects.kinds().iter().enumerate() {
         let name = format!("case {subject}, {}", kind.name());
         let (drawn, evaluated) = off(&subjects, subject);

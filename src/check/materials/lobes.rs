@@ -100,7 +100,7 @@ fn weights(context: &Context, measure: &mut Measure) -> Result<()> {
             BsdfInput::new(i % lobes.len(), &surface, wo, random.unit4())
         })
         .collect();
-    let probe = context.materials(&kinds(&lobes), Integrator::Bsdf)?;
+    let probe = context.materials(&kinds(&lobes), Integrator::Bsdf);
     for (input, s) in inputs.iter().zip(probe.sample(&inputs)?) {
         let material = &lobes[input.material as usize];
         let Some((truth, relative)) = weight_of(material, input, s.wi()) else {

@@ -54,9 +54,9 @@ fn both_ways(context: &Context, measure: &mut Measure) -> Result<()> {
         there.push(BsdfInput::new(place, &surface, wo, to_row(wi, 0.0)));
         back.push(BsdfInput::new(place, &surface, wi, to_row(wo, 0.0)));
     }
-    let probe = context.materials(&kinds(&lobes), Integrator::Bsdf)?;
+    let probe = context.materials(&kinds(&lobes), Integrator::Bsdf);
     let forth: Vec<Evaluated> = probe.evaluate(&there)?;
-    let probe = context.materials(&kinds(&wrong), Integrator::Bsdf)?;
+    let probe = context.materials(&kinds(&wrong), Integrator::Bsdf);
     let returned: Vec<Evaluated> = probe.evaluate(&back)?;
     for (input, (a, b)) in there.iter().zip(forth.iter().zip(&returned)) {
         let [wo, wi] = [input.wo(), vector(input.u)];
@@ -99,7 +99,7 @@ fn through_glass(context: &Context, measure: &mut Measure) -> Result<()> {
         })
         .collect();
     let glass = [MaterialKind::from(Dielectric::smooth(1.5))];
-    let probe = context.materials(&glass, Integrator::Bsdf)?;
+    let probe = context.materials(&glass, Integrator::Bsdf);
     let crossed: Vec<(BsdfInput, Sampled)> = std::iter::zip(there.iter(), probe.sample(&there)?)
         .filter(|(_, s)| s.event & Event::TRANSMITTED.bits() != 0)
         .map(|(input, s)| (*input, s))

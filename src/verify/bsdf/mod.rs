@@ -34,53 +34,45 @@ pub struct Subjects {
 
 impl Subjects {
     /// All cases of all materials.
-    ///
-    /// # Errors
-    /// If the device fails.
-    pub fn all(gpu: &Gpu, integrator: Integrator) -> Result<Self> {
+    #[must_use]
+    pub fn all(gpu: &Gpu, integrator: Integrator) -> Self {
         let kinds = ALL.iter().flat_map(|material| (material.cases)());
         Self::of(gpu, kinds.collect(), integrator)
     }
 
     /// The same, those of each material in a kernel without the others: drivers that execute all sides of a branch draw
     /// many samples from it in a fraction of the time.
-    ///
-    /// # Errors
-    /// If the device fails.
-    pub fn each(gpu: &Gpu, integrator: Integrator) -> Result<Vec<Self>> {
+    #[must_use]
+    pub fn each(gpu: &Gpu, integrator: Integrator) -> Vec<Self> {
         let mut all = Vec::new();
         let mut first = 0;
         for material in ALL {
             let subjects = Self {
                 first,
-                ..Self::of(gpu, (material.cases)(), integrator)?
+                ..Self::of(gpu, (material.cases)(), integrator)
             };
             first += subjects.kinds.len();
             all.push(subjects);
         }
-        Ok(all)
+        all
     }
 
     /// These.
-    ///
-    /// # Errors
-    /// If the device fails.
-    pub fn of(gpu: &Gpu, kinds: Vec<MaterialKind>, integrator: Integrator) -> Result<Self> {
-        Ok(Self {
-            probe: BsdfProbe::new(gpu, &kinds, integrator)?,
+    #[must_use]
+    pub fn of(gpu: &Gpu, kinds: Vec<MaterialKind>, integrator: Integrator) -> Self {
+        Self {
+            probe: BsdfProbe::new(gpu, &kinds, integrator),
             first: 0,
             lecture: matches!(integrator, Integrator::Lecture { .. }),
             kinds,
-        })
+        }
     }
 
     /// All cases of all materials, on the device with textures of one value each for all that may be one: a record
     /// of other values, in whose place these come. Without textures, `with_textures` being false, the other values
     /// are what it has.
-    ///
-    /// # Errors
-    /// If the device fails.
-    pub fn textured(gpu: &Gpu, with_textures: bool) -> Result<Self> {
+    #[must_use]
+    pub fn textured(gpu: &Gpu, with_textures: bool) -> Self {
         let kinds: Vec<MaterialKind> = ALL.iter().flat_map(|material| (material.cases)()).collect();
         let materials = kinds.iter().map(|kind| match with_textures {
             true => disguised(kind),
@@ -89,12 +81,12 @@ impl Subjects {
                 ..disguised(kind)
             },
         });
-        Ok(Self {
-            probe: BsdfProbe::of(gpu, materials.collect(), Integrator::Bsdf)?,
+        Self {
+            probe: BsdfProbe::of(gpu, materials.collect(), Integrator::Bsdf),
             first: 0,
             lecture: false,
             kinds,
-        })
+        }
     }
 
     /// The materials; a question names one by its place.
