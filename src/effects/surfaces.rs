@@ -27,7 +27,7 @@ pub(super) fn rows() -> Vec<Row> {
                 .marks([
                     "mix",
                     "data::MixPart",
-                    "data::part_of",
+                    "data::mix_part_of",
                     "material_of_part",
                     "FIRST_PART",
                     "PART_MATERIALS",
