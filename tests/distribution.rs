@@ -108,7 +108,7 @@ fn drawn() -> usize {
 
 /// The short form draws from so many cases of a form, the long one from all; uniform directions, which are the
 /// same for all, from one.
-const CASES: usize = 3;
+const CASES: usize = 2;
 const UNIFORM_CASES: usize = 1;
 
 /// So few samples beside a delta lobe that a normal turned by a tenth is not seen in a cosine of them.

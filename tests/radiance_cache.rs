@@ -175,10 +175,7 @@ fn corner() -> Scene {
 fn scenes() -> Vec<(&'static str, Scene, u64, bool)> {
     let file = |name: &str| scene_file(format!("scenes/{name}.toml"));
     match thorough() {
-        false => vec![
-            ("corner", corner(), 8, true),
-            ("glass", file("glass"), 8, false),
-        ],
+        false => vec![("corner", corner(), 8, true)],
         true => vec![
             ("corner", corner(), 100, true),
             ("lecture", file("lecture"), 100, false),

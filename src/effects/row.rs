@@ -147,12 +147,17 @@ impl Row {
     }
 }
 
-/// Whether one mark says so. Names are many and marks are some: nothing is allocated here.
+/// Whether one mark says so. Names are many and marks are some: nothing is allocated here, nor is a search prepared.
 pub(super) fn is_marked(name: &str, mark: &str) -> bool {
-    let is_part = |at: usize| {
-        let (before, after) = (&name[..at], &name[at + mark.len()..]);
-        (before.is_empty() || before.ends_with("::"))
-            && (after.is_empty() || after.starts_with("::"))
-    };
-    name.match_indices(mark).any(|(at, _)| is_part(at))
+    let mut rest = name;
+    loop {
+        let after = rest.strip_prefix(mark);
+        if after.is_some_and(|after| after.is_empty() || after.starts_with("::")) {
+            return true;
+        }
+        match rest.find(':') {
+            Some(end) => rest = rest[end..].trim_start_matches(':'),
+            None => return false,
+        }
+    }
 }

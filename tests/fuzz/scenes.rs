@@ -129,7 +129,7 @@ pub(super) fn ball() -> Scene {
 fn no_bytes_upset_the_scene_loader() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("fuzz.toml");
-    let tried = fuzz("scenes", numbers(20_000), &scene_files(), |_, bytes| {
+    let tried = fuzz("scenes", numbers(8_000), &scene_files(), |_, bytes| {
         let Ok(text) = str::from_utf8(bytes) else {
             std::fs::write(&path, bytes).expect("it can be written");
             return match load_file(&path) {
